@@ -1,0 +1,134 @@
+//! The decoder's events: what each does to the stream, and in which order events leave.
+//!
+//! Sticky events must follow caps, and caps are only known once downstream was asked: all serialized events but
+//! stream-start are held back until caps are sent.
+
+use gst::prelude::*;
+use gst::subclass::prelude::*;
+
+use super::CAT;
+use super::imp::TetvecDec;
+
+impl TetvecDec {
+    /// An event from upstream.
+    pub(super) fn sink_event(&self, pad: &gst::Pad, event: gst::Event) -> bool {
+        gst::log!(CAT, obj = pad, "Event {event:?}");
+        match event.view() {
+            gst::EventView::FlushStart(_) => {
+                self.set_flushing(true);
+                self.forward(pad, event)
+            }
+            gst::EventView::FlushStop(_) => {
+                self.lock_stream().flush();
+                self.set_flushing(false);
+                self.forward(pad, event)
+            }
+            gst::EventView::StreamStart(_) => {
+                self.drain();
+                self.forward(pad, event)
+            }
+            gst::EventView::Caps(caps) => {
+                self.set_caps(caps.caps());
+                true
+            }
+            gst::EventView::Segment(segment) => self.set_segment(segment.segment(), &event),
+            gst::EventView::Eos(_) => self.end_of_stream(event),
+            gst::EventView::Gap(_) | gst::EventView::SegmentDone(_) => {
+                self.drain();
+                self.negotiate_early();
+                self.push_or_hold(event)
+            }
+            _ if event.is_serialized() => self.push_or_hold(event),
+            _ => self.forward(pad, event),
+        }
+    }
+
+    /// An event from downstream.
+    pub(super) fn src_event(&self, pad: &gst::Pad, event: gst::Event) -> bool {
+        match event.view() {
+            gst::EventView::Qos(report) => {
+                let (_, proportion, diff, timestamp) = report.get();
+                self.lock_output().qos.report(proportion, diff, timestamp);
+                self.forward(pad, event)
+            }
+            // The pad is marked already; what is sent to us does not depend on what we send.
+            gst::EventView::Reconfigure(_) => true,
+            _ => self.forward(pad, event),
+        }
+    }
+
+    fn forward(&self, pad: &gst::Pad, event: gst::Event) -> bool {
+        gst::Pad::event_default(pad, Some(&*self.obj()), event)
+    }
+
+    fn set_caps(&self, caps: &gst::CapsRef) {
+        if self.sink_pad.current_caps().is_some_and(|current| *current == *caps) && self.lock_stream().source.is_some()
+        {
+            return;
+        }
+        self.drain();
+        self.lock_stream().set_caps(caps);
+        self.negotiate_early();
+    }
+
+    fn set_segment(&self, segment: &gst::Segment, event: &gst::Event) -> bool {
+        self.drain();
+        let (segment, event) = match segment.downcast_ref::<gst::ClockTime>() {
+            Some(time) => (time.clone(), event.clone()),
+            None => {
+                gst::debug!(CAT, imp = self, "Segment in {:?}: times start at 0", segment.format());
+                let open = gst::FormattedSegment::<gst::ClockTime>::new();
+                let event = gst::event::Segment::builder(&open).seqnum(event.seqnum()).build();
+                (open, event)
+            }
+        };
+        self.lock_output().qos.reset();
+        self.lock_stream().set_segment(segment);
+        self.push_or_hold(event)
+    }
+
+    fn end_of_stream(&self, event: gst::Event) -> bool {
+        self.drain();
+        self.negotiate_early();
+        if self.lock_stream().nothing_decoded() {
+            gst::element_imp_error!(self, gst::StreamError::Decode, ("No picture could be decoded before the end"));
+        }
+        // Nothing will bring caps any more: what is held leaves in any case.
+        self.push_held();
+        self.src_pad.push_event(event)
+    }
+
+    /// Shows what is gathered for reverse playback. Errors of the flow come back with the next buffer.
+    fn drain(&self) {
+        let group = self.lock_stream().take_gathered();
+        if let Err(error) = self.play_group(group) {
+            gst::debug!(CAT, imp = self, "Draining ended with {error:?}");
+        }
+    }
+
+    /// Negotiates before the first picture if the stream is known already; that it fails is no error yet.
+    fn negotiate_early(&self) {
+        if self.lock_stream().source.is_none() {
+            return;
+        }
+        if let Err(error) = self.negotiate_if_needed() {
+            gst::debug!(CAT, imp = self, "Not negotiated yet: {error:?}");
+        }
+    }
+
+    fn push_or_hold(&self, event: gst::Event) -> bool {
+        if self.src_pad.has_current_caps() {
+            return self.src_pad.push_event(event);
+        }
+        self.lock_stream().hold(event);
+        true
+    }
+
+    /// Sends the events that waited for caps.
+    pub(super) fn push_held(&self) {
+        let held = self.lock_stream().take_held();
+        for event in held {
+            self.src_pad.push_event(event);
+        }
+    }
+}

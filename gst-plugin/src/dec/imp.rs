@@ -1,0 +1,412 @@
+//! The decoder element: pads, properties, states, and the way of a packet to its pictures.
+//!
+//! Two locks: `stream` belongs to the streaming thread, `output` is what other threads reach too (flush, QoS). Neither
+//! is held over a push, a query or an event, and never one inside the other.
+
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+
+use gst::glib;
+use gst::prelude::*;
+use gst::subclass::prelude::*;
+use tetvec::{DecoderConfig, EncoderConfig};
+
+use super::CAT;
+use super::negotiate;
+use super::output::Output;
+use super::qos::Qos;
+use super::stream::{Decoded, Stream};
+use super::timing::{Picture, Span};
+use crate::{MAX_THREADS, caps};
+
+/// `subdivision-levels`: as the stream says.
+const LEVELS_OF_STREAM: i32 = -1;
+
+#[derive(Debug, Clone, Copy)]
+struct Settings {
+    subdivision_levels: i32,
+    threads: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { subdivision_levels: LEVELS_OF_STREAM, threads: 0 }
+    }
+}
+
+impl Settings {
+    fn decoder_config(self) -> DecoderConfig {
+        DecoderConfig {
+            subdivision_levels: u8::try_from(self.subdivision_levels).ok(),
+            threads: usize::try_from(self.threads).unwrap_or(0),
+        }
+    }
+}
+
+/// What other threads than the streaming thread reach.
+#[derive(Debug, Default)]
+pub(super) struct Shared {
+    flushing: bool,
+    output: Option<Output>,
+    pub(super) qos: Qos,
+}
+
+#[derive(Debug)]
+pub struct TetvecDec {
+    pub(super) sink_pad: gst::Pad,
+    pub(super) src_pad: gst::Pad,
+    settings: Mutex<Settings>,
+    stream: Mutex<Stream>,
+    shared: Mutex<Shared>,
+}
+
+impl TetvecDec {
+    pub(super) fn lock_stream(&self) -> MutexGuard<'_, Stream> {
+        self.stream.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn lock_output(&self) -> MutexGuard<'_, Shared> {
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn lock_settings(&self) -> MutexGuard<'_, Settings> {
+        self.settings.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes the streaming thread stop where it is, or lets it go on.
+    pub(super) fn set_flushing(&self, flushing: bool) {
+        let pool = {
+            let mut shared = self.lock_output();
+            shared.flushing = flushing;
+            shared.qos.reset();
+            shared.output.as_ref().map(|output| output.pool.clone())
+        };
+        if let Some(pool) = pool {
+            pool.set_flushing(flushing);
+        }
+    }
+
+    fn check_flow(&self) -> Result<(), gst::FlowError> {
+        if self.lock_output().flushing { Err(gst::FlowError::Flushing) } else { Ok(()) }
+    }
+
+    fn chain(&self, packet: gst::Buffer) -> Result<gst::FlowSuccess, gst::FlowError> {
+        gst::log!(CAT, imp = self, "Packet {packet:?}");
+        self.check_flow()?;
+        let gathered = {
+            let mut stream = self.lock_stream();
+            if stream.key_units_only() && packet.flags().contains(gst::BufferFlags::DELTA_UNIT) {
+                return Ok(gst::FlowSuccess::Ok);
+            }
+            (stream.segment.rate() < 0.0).then(|| stream.gather(packet.clone()))
+        };
+        match gathered {
+            Some(group) => self.play_group(group),
+            None => self.play_packet(&packet),
+        }
+    }
+
+    fn play_packet(&self, packet: &gst::Buffer) -> Result<gst::FlowSuccess, gst::FlowError> {
+        let Some(number) = self.decode(packet) else { return Ok(gst::FlowSuccess::Ok) };
+        let span = self.lock_stream().admit(packet, number);
+        self.show_all(number, span)
+    }
+
+    /// Decodes a group first to last and shows it last to first.
+    pub(super) fn play_group(&self, group: Vec<gst::Buffer>) -> Result<gst::FlowSuccess, gst::FlowError> {
+        let mut packets = Vec::with_capacity(group.len());
+        for packet in group {
+            self.check_flow()?;
+            if let Some(number) = self.decode(&packet) {
+                packets.push((packet, number));
+            }
+        }
+        let spans = self.lock_stream().admit_group(&packets);
+        for (&span, (_, number)) in spans.iter().zip(&packets).rev() {
+            self.show_all(*number, span)?;
+        }
+        Ok(gst::FlowSuccess::Ok)
+    }
+
+    /// Decodes a packet to the number of its frame. A damaged packet is told to the application, and a keyframe asked for.
+    fn decode(&self, packet: &gst::Buffer) -> Option<u64> {
+        let decoded = self.lock_stream().decode(packet);
+        match decoded {
+            Decoded::Picture(number) => return Some(number),
+            Decoded::Nothing => return None,
+            Decoded::Waiting => gst::debug!(CAT, imp = self, "Skipping up to the next keyframe: {packet:?}"),
+            Decoded::Damaged(reason) => {
+                gst::element_imp_warning!(
+                    self,
+                    gst::StreamError::Decode,
+                    ("A packet is damaged, going on at the next keyframe"),
+                    ["{reason}, at {}", packet.pts().display()]
+                );
+            }
+        }
+        let request = {
+            let mut stream = self.lock_stream();
+            stream.discont = true;
+            stream.wants_keyframe()
+        };
+        if request {
+            self.sink_pad.push_event(gst_video::UpstreamForceKeyUnitEvent::builder().all_headers(true).build());
+        }
+        None
+    }
+
+    fn show_all(&self, frame_number: u64, span: Span) -> Result<gst::FlowSuccess, gst::FlowError> {
+        loop {
+            self.check_flow()?;
+            // Before each picture, so that none is drawn at a size that downstream no longer takes.
+            self.negotiate_if_needed()?;
+            let Some(picture) = self.lock_stream().next_picture(span) else { break };
+            self.show(frame_number as f64 + picture.position, picture)?;
+        }
+        Ok(gst::FlowSuccess::Ok)
+    }
+
+    /// Draws the picture at `frame`, counted in frames, and sends it, unless the segment or QoS forbid.
+    fn show(&self, frame: f64, picture: Picture) -> Result<(), gst::FlowError> {
+        let segment = self.lock_stream().segment.clone();
+        let Some((time, duration)) = clip(&segment, picture)? else { return Ok(()) };
+        if self.is_late(&segment, time, duration) {
+            self.lock_stream().discont = true;
+            return Ok(());
+        }
+        let output = self.lock_output().output.clone().ok_or(gst::FlowError::NotNegotiated)?;
+        let buffer = output.pool.acquire_buffer(None)?;
+        let drawn = output.draw(buffer, |surface| self.lock_stream().render(frame, surface));
+        let mut buffer = drawn.map_err(|error| {
+            error.log_with_object(&*self.obj());
+            gst::element_imp_error!(self, gst::StreamError::Decode, ("Cannot draw a picture"), ["{error:?}"]);
+            gst::FlowError::Error
+        })?;
+        let discont = std::mem::take(&mut self.lock_stream().discont);
+        let header = buffer.make_mut();
+        header.set_pts(time);
+        header.set_duration(duration);
+        if discont {
+            header.set_flags(gst::BufferFlags::DISCONT);
+        }
+        self.src_pad.push(buffer).map(|_| ())
+    }
+
+    /// Whether a picture comes too late to be worth drawing; the application is told of it.
+    fn is_late(
+        &self,
+        segment: &gst::FormattedSegment<gst::ClockTime>,
+        time: gst::ClockTime,
+        duration: Option<gst::ClockTime>,
+    ) -> bool {
+        let message = {
+            let mut shared = self.lock_output();
+            if !shared.qos.is_late(segment.to_running_time(time)) {
+                return false;
+            }
+            shared.qos.message(time, duration, segment)
+        };
+        let _ = self.obj().post_message(message.src(&*self.obj()).build());
+        true
+    }
+
+    /// Negotiates if downstream asked for it, or the stream changed.
+    pub(super) fn negotiate_if_needed(&self) -> Result<(), gst::FlowError> {
+        let changed = std::mem::take(&mut self.lock_stream().renegotiate);
+        let asked = self.src_pad.check_reconfigure();
+        if !changed && !asked {
+            return Ok(());
+        }
+        self.negotiate().map_err(|error| {
+            self.src_pad.mark_reconfigure();
+            if self.lock_output().flushing {
+                return gst::FlowError::Flushing;
+            }
+            error.log_with_object(&*self.obj());
+            gst::FlowError::NotNegotiated
+        })
+    }
+
+    fn negotiate(&self) -> Result<(), gst::LoggableError> {
+        let source = self.lock_stream().source.ok_or_else(|| gst::loggable_error!(CAT, "No size is known yet"))?;
+        let peer = self.src_pad.peer_query_caps(None);
+        // The peer's order counts, so its caps come first.
+        let allowed = peer.intersect_with_mode(&self.src_pad.pad_template_caps(), gst::CapsIntersectMode::First);
+        let caps = negotiate::candidates(&allowed, source)
+            .find(|caps| self.src_pad.peer_query_accept_caps(caps) || !self.src_pad.is_linked())
+            .ok_or_else(|| gst::loggable_error!(CAT, "Downstream takes none of our caps: {peer}"))?;
+        gst::debug!(CAT, imp = self, "Rendering {source:?} to {caps}");
+        if self.src_pad.current_caps().as_ref() != Some(&caps) {
+            self.src_pad.push_event(gst::event::Caps::new(&caps));
+        }
+        let output = Output::try_new(&self.src_pad, &caps)?;
+        self.lock_stream().set_output_rate(output.info.fps());
+        self.install(Some(output));
+        self.push_held();
+        Ok(())
+    }
+
+    /// Puts `output` in place of the one before, whose pool is closed.
+    fn install(&self, output: Option<Output>) {
+        let old = {
+            let mut shared = self.lock_output();
+            if let Some(new) = output.as_ref().filter(|_| shared.flushing) {
+                new.pool.set_flushing(true);
+            }
+            std::mem::replace(&mut shared.output, output)
+        };
+        if let Some(old) = old {
+            let _ = old.pool.set_active(false);
+        }
+    }
+}
+
+/// The part of `picture` that lies in `segment`; `None` outside.
+fn clip(
+    segment: &gst::FormattedSegment<gst::ClockTime>,
+    picture: Picture,
+) -> Result<Option<(gst::ClockTime, Option<gst::ClockTime>)>, gst::FlowError> {
+    let time = picture.time;
+    if segment.rate() > 0.0 && segment.stop().is_some_and(|stop| time >= stop) {
+        return Err(gst::FlowError::Eos);
+    }
+    let Some(duration) = picture.duration else {
+        let outside =
+            segment.start().is_some_and(|start| time < start) || segment.stop().is_some_and(|stop| time >= stop);
+        return Ok((!outside).then_some((time, None)));
+    };
+    let end = time.checked_add(duration);
+    let Some((start, stop)) = segment.clip(time, end) else { return Ok(None) };
+    let start = start.unwrap_or(time);
+    Ok(Some((start, stop.map(|stop| stop.saturating_sub(start)))))
+}
+
+#[glib::object_subclass]
+impl ObjectSubclass for TetvecDec {
+    const NAME: &'static str = "GstTetvecDec";
+    type Type = super::TetvecDec;
+    type ParentType = gst::Element;
+
+    fn with_class(class: &Self::Class) -> Self {
+        let templates = class.pad_template("sink").zip(class.pad_template("src"));
+        let (sink, src) = templates.expect("the class has both templates");
+        let sink_pad = gst::Pad::builder_from_template(&sink)
+            .chain_function(|_, parent, packet| {
+                Self::catch_panic_pad_function(parent, || Err(gst::FlowError::Error), |this| this.chain(packet))
+            })
+            .event_function(|pad, parent, event| {
+                Self::catch_panic_pad_function(parent, || false, |this| this.sink_event(pad, event))
+            })
+            .flags(gst::PadFlags::ACCEPT_TEMPLATE)
+            .build();
+        let src_pad = gst::Pad::builder_from_template(&src)
+            .event_function(|pad, parent, event| {
+                Self::catch_panic_pad_function(parent, || false, |this| this.src_event(pad, event))
+            })
+            .build();
+        Self {
+            sink_pad,
+            src_pad,
+            settings: Mutex::default(),
+            stream: Mutex::new(Stream::new(DecoderConfig::default())),
+            shared: Mutex::default(),
+        }
+    }
+}
+
+impl ObjectImpl for TetvecDec {
+    fn properties() -> &'static [glib::ParamSpec] {
+        static PROPERTIES: LazyLock<Vec<glib::ParamSpec>> = LazyLock::new(|| {
+            let default = Settings::default();
+            vec![
+                glib::ParamSpecInt::builder("subdivision-levels")
+                    .nick("Subdivision levels")
+                    .blurb("Levels of subdivision to draw with: more is smoother and slower (-1 = as the stream says)")
+                    .minimum(LEVELS_OF_STREAM)
+                    .maximum(i32::from(*EncoderConfig::SUBDIVISION_LEVELS.end()))
+                    .default_value(default.subdivision_levels)
+                    .mutable_ready()
+                    .build(),
+                glib::ParamSpecUInt::builder("threads")
+                    .nick("Threads")
+                    .blurb("Worker threads; pictures do not depend on it (0 = all cores)")
+                    .maximum(MAX_THREADS)
+                    .default_value(default.threads)
+                    .mutable_ready()
+                    .build(),
+            ]
+        });
+        &PROPERTIES
+    }
+
+    fn set_property(&self, _id: usize, value: &glib::Value, pspec: &glib::ParamSpec) {
+        let mut settings = self.lock_settings();
+        match pspec.name() {
+            "subdivision-levels" => settings.subdivision_levels = value.get().expect("checked by GObject"),
+            "threads" => settings.threads = value.get().expect("checked by GObject"),
+            name => unreachable!("no property {name}"),
+        }
+    }
+
+    fn property(&self, _id: usize, pspec: &glib::ParamSpec) -> glib::Value {
+        let settings = self.lock_settings();
+        match pspec.name() {
+            "subdivision-levels" => settings.subdivision_levels.to_value(),
+            "threads" => settings.threads.to_value(),
+            name => unreachable!("no property {name}"),
+        }
+    }
+
+    fn constructed(&self) {
+        self.parent_constructed();
+        let obj = self.obj();
+        obj.add_pad(&self.sink_pad).expect("a new element has no pads");
+        obj.add_pad(&self.src_pad).expect("a new element has no pads");
+    }
+}
+
+impl GstObjectImpl for TetvecDec {}
+
+impl ElementImpl for TetvecDec {
+    fn metadata() -> Option<&'static gst::subclass::ElementMetadata> {
+        static METADATA: LazyLock<gst::subclass::ElementMetadata> = LazyLock::new(|| {
+            gst::subclass::ElementMetadata::new(
+                "Vector video decoder",
+                "Codec/Decoder/Video",
+                "Renders tetvec vector video at any size and frame rate",
+                "The tetvec developers",
+            )
+        });
+        Some(&METADATA)
+    }
+
+    fn pad_templates() -> &'static [gst::PadTemplate] {
+        static TEMPLATES: LazyLock<Vec<gst::PadTemplate>> = LazyLock::new(|| {
+            let template = |name, direction, caps: &gst::Caps| {
+                gst::PadTemplate::new(name, direction, gst::PadPresence::Always, caps).expect("a valid template")
+            };
+            vec![
+                template("sink", gst::PadDirection::Sink, &caps::packets().build()),
+                template("src", gst::PadDirection::Src, &caps::pictures(tetvec::video::MAX_SURFACE_SIDE)),
+            ]
+        });
+        &TEMPLATES
+    }
+
+    fn change_state(&self, transition: gst::StateChange) -> Result<gst::StateChangeSuccess, gst::StateChangeError> {
+        match transition {
+            gst::StateChange::ReadyToPaused => {
+                let config = self.lock_settings().decoder_config();
+                *self.lock_stream() = Stream::new(config);
+                *self.lock_output() = Shared::default();
+            }
+            gst::StateChange::PausedToReady => self.set_flushing(true),
+            _ => (),
+        }
+        let success = self.parent_change_state(transition)?;
+        if transition == gst::StateChange::PausedToReady {
+            self.install(None);
+            *self.lock_stream() = Stream::new(DecoderConfig::default());
+        }
+        Ok(success)
+    }
+}

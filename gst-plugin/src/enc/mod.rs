@@ -1,0 +1,22 @@
+//! `tetvecenc`: raw pictures in, packets of vector video out.
+//!
+//! Pictures are copied on arrival, as they wait for a whole window. Forbidden here: knowledge of packets' contents.
+use gst::glib;
+use gst::prelude::*;
+
+mod imp;
+mod picture;
+mod session;
+mod settings;
+
+pub(crate) use settings::ErrorMetric;
+
+glib::wrapper! {
+    /// Vectorizes video.
+    pub struct TetvecEnc(ObjectSubclass<imp::TetvecEnc>) @extends gst_video::VideoEncoder, gst::Element, gst::Object, @implements gst::Preset;
+}
+
+pub(crate) fn register(plugin: &gst::Plugin) -> Result<(), glib::BoolError> {
+    ErrorMetric::static_type().mark_as_plugin_api(gst::PluginAPIFlags::empty());
+    gst::Element::register(Some(plugin), "tetvecenc", gst::Rank::PRIMARY, TetvecEnc::static_type())
+}

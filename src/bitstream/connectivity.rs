@@ -1,0 +1,288 @@
+//! Which vertex lies behind a face: the choice of the next gate and the coding of its apex.
+//!
+//! In: the front around a focus vertex. Out: a gate, and what lies behind it. Forbidden here: positions of new
+//! vertices, colours, labels.
+//!
+//! As in the cut-border machine (Gumhold et al. 1999), tets are attached to open faces one by one, and a symbol says
+//! whether the new corner closes the gap to a neighbouring open face, is a new vertex, or lies elsewhere on the front.
+//! Unlike there, the mesh's geometry is known to both sides before its connectivity: the gap at an edge between two
+//! open faces is either sharp, then almost surely closed by one tet, or wide. So the sharpest gap at the focus comes
+//! first, and its angle is the context.
+
+use glam::DVec3;
+
+use super::MeshFault;
+use super::front::Front;
+use super::range_coder::{BitCoder, BitModel};
+use super::symbols::UintModel;
+use crate::mesh::{TetMesh, VertexId, volume6};
+
+/// Open faces of one vertex that are looked at. Typical vertices have six; a hub of thousands stays cheap.
+const SCAN: usize = 24;
+
+/// Classes of cos(angle) of a gap.
+const ANGLES: usize = 12;
+
+/// What lies behind a gate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Apex {
+    /// A vertex that is not coded yet.
+    New,
+    /// A coded vertex.
+    Known(VertexId),
+    /// Nothing: the mesh has a hole here.
+    Hole,
+    /// Nothing: the face lies on t = duration.
+    Top,
+}
+
+/// A coded vertex across an edge of the gate.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    vertex: VertexId,
+    /// Cosine of the gap's angle, the sharpest if several edges lead to the vertex.
+    cos: f64,
+    /// Edges of the gate across which the vertex lies, 1 to 3.
+    edges: usize,
+}
+
+/// An open face to be closed, and the vertices that may close it.
+#[derive(Debug, Clone)]
+pub(super) struct Gate {
+    /// Its id in the front.
+    pub(super) face: u32,
+    /// Its corners, the focus first.
+    pub(super) corners: [VertexId; 3],
+    candidates: [Option<Candidate>; 3],
+}
+
+/// Models of the apex symbols.
+#[derive(Debug, Clone)]
+pub(super) struct ConnectivityModels {
+    /// By place in the order of candidates, edges, angle.
+    join: [[[BitModel; ANGLES]; 3]; 3],
+    /// By number of candidates, angle of the sharpest.
+    new: [[BitModel; ANGLES]; 4],
+    /// Rank among the front's vertices around the gate, plus 1; 0: not among them.
+    rank: UintModel,
+    nothing: BitModel,
+    top: BitModel,
+}
+
+impl ConnectivityModels {
+    pub(super) const NEW: Self = Self {
+        join: [[[BitModel::NEW; ANGLES]; 3]; 3],
+        new: [[BitModel::NEW; ANGLES]; 4],
+        rank: UintModel::NEW,
+        nothing: BitModel::NEW,
+        top: BitModel::NEW,
+    };
+}
+
+/// Class of an angle: equal steps of its cosine.
+fn angle_class(cos: f64) -> usize {
+    (((cos + 1.0) * (ANGLES as f64 / 2.0)) as usize).min(ANGLES - 1)
+}
+
+/// Whether the tet of `corners` and `apex` is positive.
+fn is_positive(mesh: &TetMesh, [a, b, c]: [VertexId; 3], apex: VertexId) -> bool {
+    let at = |v: VertexId| mesh.positions[v.index()];
+    volume6(at(a), at(b), at(c), at(apex)) > 0
+}
+
+/// Cosine of the angle between two open faces with a common edge and these unit normals, measured on the open side; angles beyond 180 degrees are the caller's to exclude.
+fn gap_cos(n: DVec3, m: DVec3) -> f64 {
+    -(n.x * m.x + n.y * m.y + n.z * m.z)
+}
+
+/// The youngest open faces of a vertex, as columns: they are compared all with all.
+struct Fan {
+    count: usize,
+    faces: [u32; SCAN],
+    /// The corner after the focus, anticlockwise.
+    second: [VertexId; SCAN],
+    /// The corner before it.
+    third: [VertexId; SCAN],
+    normals: [DVec3; SCAN],
+}
+
+impl Fan {
+    fn gather(front: &Front, focus: VertexId) -> Self {
+        let mut fan = Self {
+            count: 0,
+            faces: [0; SCAN],
+            second: [focus; SCAN],
+            third: [focus; SCAN],
+            normals: [DVec3::ZERO; SCAN],
+        };
+        for (place, (face, [_, second, third])) in front.at(focus).take(SCAN).enumerate() {
+            fan.faces[place] = face;
+            fan.second[place] = second;
+            fan.third[place] = third;
+            fan.normals[place] = front.face(face).normal;
+            fan.count = place + 1;
+        }
+        fan
+    }
+
+    /// The youngest face that follows face `place` around the focus.
+    fn next(&self, place: usize) -> Option<usize> {
+        let wanted = self.third[place];
+        self.second[..self.count].iter().position(|&second| second == wanted)
+    }
+
+    /// The youngest face that comes before face `place` around the focus.
+    fn previous(&self, place: usize) -> Option<usize> {
+        let wanted = self.second[place];
+        self.third[..self.count].iter().position(|&third| third == wanted)
+    }
+
+    /// The face before the sharpest gap; without a gap below 180 degrees the youngest.
+    fn sharpest(&self, mesh: &TetMesh, focus: VertexId) -> usize {
+        let (mut best, mut best_cos) = (0, f64::NEG_INFINITY);
+        for place in 0..self.count {
+            let Some(next) = self.next(place) else { continue };
+            let cos = gap_cos(self.normals[place], self.normals[next]);
+            let corners = [focus, self.second[place], self.third[place]];
+            if cos > best_cos && is_positive(mesh, corners, self.third[next]) {
+                (best, best_cos) = (place, cos);
+            }
+        }
+        best
+    }
+}
+
+/// The open face at `focus` to close next: the one before the sharpest gap at an edge of `focus`, going around it
+/// anticlockwise. `None`: all faces at `focus` are closed.
+pub(super) fn choose_gate(front: &Front, mesh: &TetMesh, focus: VertexId) -> Option<Gate> {
+    let fan = Fan::gather(front, focus);
+    if fan.count == 0 {
+        return None;
+    }
+    let place = fan.sharpest(mesh, focus);
+    let corners = [focus, fan.second[place], fan.third[place]];
+    let across = [
+        fan.next(place).map(|next| (fan.third[next], fan.normals[next])),
+        fan.previous(place).map(|previous| (fan.second[previous], fan.normals[previous])),
+        find_opposite(front, corners),
+    ];
+    let mut candidates: [Option<Candidate>; 3] = [None; 3];
+    for (vertex, normal) in across.into_iter().flatten() {
+        if is_positive(mesh, corners, vertex) {
+            add_candidate(&mut candidates, vertex, gap_cos(fan.normals[place], normal));
+        }
+    }
+    // Those of several edges first, then by angle. Stable: ties keep the order of edges.
+    candidates.sort_by(|a, b| {
+        let key = |c: &Option<Candidate>| c.map_or((0, f64::NEG_INFINITY), |c| (c.edges, c.cos));
+        let (a, b) = (key(a), key(b));
+        b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
+    });
+    Some(Gate { face: fan.faces[place], corners, candidates })
+}
+
+/// The vertex and the normal of the youngest open face across the gate's edge opposite the focus.
+fn find_opposite(front: &Front, [_, a, b]: [VertexId; 3]) -> Option<(VertexId, DVec3)> {
+    // Neighbours run through a common edge in opposite directions, this one from b to a. Of its two ends the one with
+    // fewer open faces is searched.
+    let from_a = front.count(a) <= front.count(b);
+    let (start, end) = if from_a { (a, b) } else { (b, a) };
+    let turned = |[_, second, third]: [VertexId; 3]| if from_a { (third, second) } else { (second, third) };
+    let mut faces = front.at(start).take(SCAN).map(|(face, corners)| (face, turned(corners)));
+    let (face, (_, vertex)) = faces.find(|&(_, (across, _))| across == end)?;
+    Some((vertex, front.face(face).normal))
+}
+
+fn add_candidate(candidates: &mut [Option<Candidate>; 3], vertex: VertexId, cos: f64) {
+    for slot in candidates {
+        match slot {
+            Some(known) if known.vertex == vertex => {
+                known.edges += 1;
+                known.cos = known.cos.max(cos);
+                return;
+            }
+            Some(_) => {}
+            None => {
+                *slot = Some(Candidate { vertex, cos, edges: 1 });
+                return;
+            }
+        }
+    }
+}
+
+/// Codes what lies behind `gate`. `truth` is what the writer knows; the parser's is ignored.
+///
+/// # Errors
+/// A reference to a vertex that does not exist.
+pub(super) fn code_apex(
+    coder: &mut impl BitCoder,
+    models: &mut ConnectivityModels,
+    (front, mesh): (&Front, &TetMesh),
+    gate: &Gate,
+    truth: Apex,
+) -> Result<Apex, MeshFault> {
+    for (place, candidate) in gate.candidates.iter().flatten().enumerate() {
+        let model = &mut models.join[place][candidate.edges - 1][angle_class(candidate.cos)];
+        if coder.bit(model, truth == Apex::Known(candidate.vertex)) {
+            return Ok(Apex::Known(candidate.vertex));
+        }
+    }
+    let sharpest = gate.candidates[0].map_or(0, |c| angle_class(c.cos));
+    let model = &mut models.new[gate.candidates.iter().flatten().count()][sharpest];
+    if coder.bit(model, truth == Apex::New) {
+        return Ok(Apex::New);
+    }
+    let near = near_vertices(front, mesh, gate);
+    let rank = near.iter().position(|&(_, v)| truth == Apex::Known(v)).map_or(0, |rank| rank as u32 + 1);
+    let rank = models.rank.code(coder, rank);
+    if rank > 0 {
+        let expected = near.len() as u32;
+        let found = near.get(rank as usize - 1);
+        return found.map(|&(_, v)| Apex::Known(v)).ok_or(MeshFault::Reference {
+            field: "vertex near the gate",
+            expected,
+            found: rank - 1,
+        });
+    }
+    if coder.bit(&mut models.nothing, matches!(truth, Apex::Hole | Apex::Top)) {
+        return Ok(if coder.bit(&mut models.top, truth == Apex::Top) { Apex::Top } else { Apex::Hole });
+    }
+    let known = if let Apex::Known(v) = truth { v } else { VertexId(0) };
+    code_vertex_id(coder, known, mesh.positions.len() as u32).map(Apex::Known)
+}
+
+/// Codes a reference to one of `count` vertices as a plain number.
+pub(super) fn code_vertex_id(coder: &mut impl BitCoder, truth: VertexId, count: u32) -> Result<VertexId, MeshFault> {
+    let found = coder.raw(u32::BITS - count.leading_zeros(), truth.0);
+    if found < count {
+        Ok(VertexId(found))
+    } else {
+        Err(MeshFault::Reference { field: "vertex", expected: count, found })
+    }
+}
+
+/// The front's vertices around the gate that make a positive tet with it and are not candidates, nearest to the
+/// gate's reflection first, each with the square of thrice its distance; ties by id.
+fn near_vertices(front: &Front, mesh: &TetMesh, gate: &Gate) -> Vec<(f64, VertexId)> {
+    let mut near: Vec<VertexId> = Vec::with_capacity(2 * SCAN);
+    for corner in gate.corners {
+        near.extend(front.at(corner).take(SCAN).flat_map(|(_, [_, second, third])| [second, third]));
+    }
+    near.sort_unstable();
+    near.dedup();
+    let is_candidate = |v| gate.candidates.iter().flatten().any(|c| c.vertex == v);
+    near.retain(|&v| !is_candidate(v) && is_positive(mesh, gate.corners, v));
+    let at = |v: VertexId| mesh.positions[v.index()];
+    let behind = mesh.tet_vertices(front.face(gate.face).tet as usize);
+    let opposite = behind.into_iter().find(|v| !gate.corners.contains(v)).unwrap_or(behind[0]);
+    let center3 = gate.corners.into_iter().map(at).sum::<glam::IVec3>();
+    // Thrice the position, to stay with integers: 2 (a + b + c) - 3 e.
+    let reflected3 = 2 * center3 - 3 * at(opposite);
+    let distance = |v: VertexId| {
+        let d = front.metric().vector(reflected3, 3 * at(v));
+        d.x * d.x + d.y * d.y + d.z * d.z
+    };
+    let mut ranked: Vec<(f64, VertexId)> = near.into_iter().map(|v| (distance(v), v)).collect();
+    ranked.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    ranked
+}

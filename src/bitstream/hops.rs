@@ -1,0 +1,124 @@
+//! The hop rule: which vertices' stars a packet completes (docs/architecture.md, "Packets and time").
+//!
+//! In: vertices as they are coded, and the edges around those whose stars are complete. Out: the next vertex whose
+//! star to complete. Forbidden here: coding.
+//!
+//! Low vertices have hop 0; the others their distance from the low ones in edges. Vertices come out in the order of
+//! their hops, each with its star still to be completed, so that hops up to [`RINGS`] are exact when a packet ends.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use crate::mesh::VertexId;
+
+/// Rings around the low vertices whose tets a packet brings.
+pub const RINGS: u8 = 2;
+
+/// A vertex not known to be within [`RINGS`].
+const FAR: u8 = u8::MAX;
+
+/// Hops of all coded vertices, and what to do next.
+#[derive(Debug, Clone)]
+pub(super) struct Hops {
+    hop: Vec<u8>,
+    /// Vertices to visit, by hop.
+    queues: [VecDeque<VertexId>; RINGS as usize + 1],
+    /// Vertices that will be low in later packets, by frame.
+    later: BTreeMap<u32, Vec<VertexId>>,
+    /// Frames below which a vertex is low.
+    low_frames: u32,
+}
+
+impl Hops {
+    pub(super) fn new() -> Self {
+        Self { hop: Vec::new(), queues: Default::default(), later: BTreeMap::new(), low_frames: 0 }
+    }
+
+    /// From here on vertices before frame `low_frames` are low.
+    pub(super) fn begin_packet(&mut self, low_frames: u32) {
+        self.low_frames = low_frames;
+        let still_later = self.later.split_off(&low_frames);
+        for vertex in std::mem::replace(&mut self.later, still_later).into_values().flatten() {
+            self.lower(vertex, 0);
+        }
+    }
+
+    /// Adds the next vertex, which lies in the frame `frame`: at its time or before the next frame's.
+    pub(super) fn push_vertex(&mut self, frame: u32) {
+        let vertex = VertexId(self.hop.len() as u32);
+        self.hop.push(FAR);
+        if frame < self.low_frames {
+            self.lower(vertex, 0);
+        } else {
+            self.later.entry(frame).or_default().push(vertex);
+        }
+    }
+
+    /// The next vertex to complete, and its hop.
+    pub(super) fn next(&mut self) -> Option<(VertexId, u8)> {
+        for hop in 0..=RINGS {
+            while let Some(vertex) = self.queues[hop as usize].pop_front() {
+                // Otherwise it was lowered since, and has been visited with the lower hop.
+                if self.hop[vertex.index()] == hop {
+                    return Some((vertex, hop));
+                }
+            }
+        }
+        None
+    }
+
+    /// Whether `vertex` is within [`RINGS`].
+    pub(super) fn is_near(&self, vertex: VertexId) -> bool {
+        self.hop[vertex.index()] <= RINGS
+    }
+
+    /// Notes that `vertex` is at most `hop` edges away.
+    pub(super) fn lower(&mut self, vertex: VertexId, hop: u8) {
+        if hop <= RINGS && hop < self.hop[vertex.index()] {
+            self.hop[vertex.index()] = hop;
+            self.queues[hop as usize].push_back(vertex);
+        }
+    }
+
+    /// Visits `vertex` once more, if it is near: its star has grown.
+    pub(super) fn revisit(&mut self, vertex: VertexId) {
+        if self.is_near(vertex) {
+            self.queues[self.hop[vertex.index()] as usize].push_back(vertex);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vertices_come_in_the_order_of_hops() {
+        let mut hops = Hops::new();
+        hops.begin_packet(1);
+        for frame in [3, 0, 1, 0] {
+            hops.push_vertex(frame);
+        }
+        assert_eq!(hops.next(), Some((VertexId(1), 0)));
+        hops.lower(VertexId(2), 1);
+        hops.lower(VertexId(0), RINGS + 1);
+        assert_eq!(hops.next(), Some((VertexId(3), 0)));
+        assert_eq!(hops.next(), Some((VertexId(2), 1)));
+        assert_eq!(hops.next(), None);
+        assert!(!hops.is_near(VertexId(0)));
+        hops.begin_packet(u32::MAX);
+        assert_eq!(hops.next(), Some((VertexId(2), 0)));
+        assert_eq!(hops.next(), Some((VertexId(0), 0)));
+        assert_eq!(hops.next(), None);
+    }
+
+    #[test]
+    fn a_vertex_lowered_while_it_waits_is_visited_once() {
+        let mut hops = Hops::new();
+        hops.begin_packet(1);
+        hops.push_vertex(5);
+        hops.lower(VertexId(0), 2);
+        hops.lower(VertexId(0), 1);
+        assert_eq!(hops.next(), Some((VertexId(0), 1)));
+        assert_eq!(hops.next(), None);
+    }
+}

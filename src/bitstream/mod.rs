@@ -1,0 +1,57 @@
+//! The `.tetv` stream: headers, packets, entropy-coded meshes; `write_x` beside `parse_x` (docs/format.md).
+//!
+//! In: a slab's committed mesh (write), bytes (parse). Out: packets, meshes. Forbidden here: pixels, files, clocks,
+//! threads, and any panic, unbounded allocation or endless loop that bytes could cause.
+
+mod colors;
+mod connectivity;
+mod error;
+mod face_map;
+mod framing;
+mod front;
+mod header;
+mod hops;
+mod index;
+mod labels;
+mod limits;
+mod parser;
+mod positions;
+mod range_coder;
+mod slab;
+#[cfg(feature = "encode")]
+mod source;
+mod symbols;
+#[cfg(feature = "encode")]
+mod writer;
+
+#[cfg(feature = "encode")]
+pub use colors::quantize_color;
+#[cfg(feature = "encode")]
+pub use error::WriteError;
+pub use error::{MeshFault, ParseError};
+pub use framing::{
+    MAGIC, PacketHeader, SEQUENCE_HEADER_BYTES, SYNC, VERSION, find_packet, parse_packet_header, parse_sequence_header,
+};
+pub use header::{Fraction, SequenceHeader};
+pub use hops::RINGS;
+#[cfg(feature = "encode")]
+pub use index::IndexWriter;
+pub use index::{Index, IndexEntry, TAIL_BYTES, index_length};
+pub use limits::Limits;
+pub use parser::SlabParser;
+#[cfg(feature = "encode")]
+pub use writer::SlabWriter;
+
+/// One coded packet, framed, as it is stored and sent.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Packet {
+    /// Number of the frame whose picture this packet completes, counted from the start of the stream. The index
+    /// packet that ends a stream carries the number one past the last frame.
+    pub frame_number: u64,
+    /// Whether decoding can start here.
+    pub keyframe: bool,
+    /// False for the index that ends a stream: no picture belongs to it.
+    pub picture: bool,
+    /// Sync word to CRC.
+    pub data: Vec<u8>,
+}

@@ -1,0 +1,299 @@
+//! Adaptive binary range coding: the one place where decisions become bytes.
+//!
+//! In: decisions, each with the model of its context. Out: bytes, and back. Forbidden here: what a decision means.
+//!
+//! The interval arithmetic is Martin's range coder in the carry-propagating form that LZMA made common (32-bit range,
+//! renormalised bytewise above 2^24). A library's multi-symbol coder was weighed against it: here every decision is
+//! binary and adapts at once, which needs no division and no cumulative table, and a packet of few bytes pays for one
+//! or two bytes of flushing instead of a 32-bit word or two.
+
+/// The probability that a decision is 1, learnt from the decisions coded before in the same context.
+///
+/// The mean of a fast and a slow exponential average (both start with the plain mean of the first decisions), so that
+/// a new context learns within a few symbols and an old one is precise.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BitModel {
+    fast: u16,
+    slow: u16,
+    seen: u8,
+}
+
+/// Window of the fast average, as a power of two.
+const FAST_SHIFT: u32 = 4;
+/// Window of the slow average, as a power of two.
+const SLOW_SHIFT: u32 = 7;
+/// Decisions after which the slow average has reached its window.
+const SEEN_MAX: u8 = (1 << SLOW_SHIFT) - 2;
+
+impl BitModel {
+    /// A model that expects nothing.
+    pub(super) const NEW: Self = Self { fast: 1 << 15, slow: 1 << 15, seen: 0 };
+
+    /// P(1) in 1/65536. Averages stop moving a window short of 0 and 1, so it stays away from both by 32 or more.
+    fn probability(self) -> u32 {
+        (u32::from(self.fast) + u32::from(self.slow)) >> 1
+    }
+
+    fn update(&mut self, bit: bool) {
+        let shift = (u32::from(self.seen) + 2).ilog2();
+        for (average, limit) in [(&mut self.fast, FAST_SHIFT), (&mut self.slow, SLOW_SHIFT)] {
+            let shift = shift.min(limit);
+            if bit {
+                *average += (u16::MAX - *average) >> shift;
+            } else {
+                *average -= *average >> shift;
+            }
+        }
+        self.seen = (self.seen + 1).min(SEEN_MAX);
+    }
+}
+
+/// The range stays at or above this between decisions.
+const RANGE_MIN: u32 = 1 << 24;
+
+/// One side of the coding. Models and syntax are written once against it: the writer codes the decisions it is given
+/// and returns them, the parser ignores what it is given and returns what it reads.
+pub(super) trait BitCoder {
+    /// Codes one decision in the context of `model`, and updates it.
+    fn bit(&mut self, model: &mut BitModel, bit: bool) -> bool;
+
+    /// Codes the low `count` (at most 32) bits of `value`, each as likely 0 as 1, the highest first.
+    fn raw(&mut self, count: u32, value: u32) -> u32;
+}
+
+/// Codes decisions to bytes.
+#[cfg(feature = "encode")]
+#[derive(Debug)]
+pub(super) struct RangeEncoder {
+    /// Low end of the interval; bit 32 is a carry into the bytes that wait.
+    low: u64,
+    range: u32,
+    /// The last byte below which a carry can still reach, then this many bytes 0xff.
+    waiting: Option<u8>,
+    waiting_ff: usize,
+    bytes: Vec<u8>,
+}
+
+#[cfg(feature = "encode")]
+impl RangeEncoder {
+    pub(super) fn new() -> Self {
+        Self { low: 0, range: u32::MAX, waiting: None, waiting_ff: 0, bytes: Vec::new() }
+    }
+
+    /// Moves the top byte of `low` out, behind the bytes that a carry can still change.
+    fn shift_low(&mut self) {
+        let top = (self.low >> 24) as u32;
+        if top == 0xff {
+            self.waiting_ff += 1;
+        } else {
+            let carry = (top >> 8) as u8;
+            // The interval starts within [0, 1), so there is never a carry before the first byte.
+            self.bytes.extend(self.waiting.map(|byte| byte.wrapping_add(carry)));
+            self.bytes.extend(std::iter::repeat_n(0xffu8.wrapping_add(carry), self.waiting_ff));
+            self.waiting = Some(top as u8);
+            self.waiting_ff = 0;
+        }
+        self.low = (self.low & 0x00ff_ffff) << 8;
+    }
+
+    fn normalize(&mut self) {
+        while self.range < RANGE_MIN {
+            self.range <<= 8;
+            self.shift_low();
+        }
+    }
+
+    /// The bytes of all decisions: of the final interval the number with the most zeros at its end, those left out.
+    pub(super) fn finish(mut self) -> Vec<u8> {
+        let high = self.low + u64::from(self.range) - 1;
+        for mask in [0xff_ffff, 0xffff, 0xff, 0] {
+            let rounded = (self.low + mask) & !mask;
+            if rounded <= high {
+                self.low = rounded;
+                break;
+            }
+        }
+        for _ in 0..5 {
+            self.shift_low();
+        }
+        let kept = self.bytes.len().saturating_sub(RangeDecoder::FREE_BYTES as usize);
+        while self.bytes.len() > kept && self.bytes.last() == Some(&0) {
+            self.bytes.pop();
+        }
+        self.bytes
+    }
+}
+
+#[cfg(feature = "encode")]
+impl BitCoder for RangeEncoder {
+    #[inline]
+    fn bit(&mut self, model: &mut BitModel, bit: bool) -> bool {
+        let bound = ((u64::from(self.range) * u64::from(model.probability())) >> 16) as u32;
+        if bit {
+            self.range = bound;
+        } else {
+            self.low += u64::from(bound);
+            self.range -= bound;
+        }
+        model.update(bit);
+        self.normalize();
+        bit
+    }
+
+    fn raw(&mut self, count: u32, value: u32) -> u32 {
+        for place in (0..count).rev() {
+            self.range >>= 1;
+            if value >> place & 1 == 0 {
+                self.low += u64::from(self.range);
+            }
+            self.normalize();
+        }
+        value
+    }
+}
+
+/// Reads decisions back. Reading past the end gives zeros; [`Self::is_exhausted`] tells.
+#[derive(Debug)]
+pub(super) struct RangeDecoder<'a> {
+    bytes: &'a [u8],
+    next: usize,
+    code: u32,
+    range: u32,
+}
+
+impl<'a> RangeDecoder<'a> {
+    /// Zeros that may be read past the end, since the encoder leaves zeros at the end out.
+    pub(super) const FREE_BYTES: u32 = 4;
+
+    pub(super) fn new(bytes: &'a [u8]) -> Self {
+        let mut decoder = Self { bytes, next: 0, code: 0, range: u32::MAX };
+        for _ in 0..4 {
+            decoder.shift();
+        }
+        decoder
+    }
+
+    fn shift(&mut self) {
+        self.code = self.code << 8 | u32::from(self.bytes.get(self.next).copied().unwrap_or(0));
+        self.next = self.next.saturating_add(1);
+    }
+
+    fn normalize(&mut self) {
+        while self.range < RANGE_MIN {
+            self.range <<= 8;
+            self.shift();
+        }
+    }
+
+    /// Whether more has been read than any encoder wrote.
+    pub(super) fn is_exhausted(&self) -> bool {
+        self.next > self.bytes.len() + Self::FREE_BYTES as usize
+    }
+
+    /// Bytes at the end that were not read.
+    pub(super) fn unread(&self) -> usize {
+        self.bytes.len().saturating_sub(self.next)
+    }
+}
+
+impl BitCoder for RangeDecoder<'_> {
+    #[inline]
+    fn bit(&mut self, model: &mut BitModel, _: bool) -> bool {
+        let bound = ((u64::from(self.range) * u64::from(model.probability())) >> 16) as u32;
+        let bit = self.code < bound;
+        if bit {
+            self.range = bound;
+        } else {
+            self.code -= bound;
+            self.range -= bound;
+        }
+        model.update(bit);
+        self.normalize();
+        bit
+    }
+
+    fn raw(&mut self, count: u32, _: u32) -> u32 {
+        let mut value = 0;
+        for _ in 0..count {
+            self.range >>= 1;
+            let bit = self.code < self.range;
+            if !bit {
+                self.code -= self.range;
+            }
+            value = value << 1 | u32::from(bit);
+            self.normalize();
+        }
+        value
+    }
+}
+
+#[cfg(all(test, feature = "encode"))]
+mod tests {
+    use super::*;
+
+    /// A sequence of (context, bit) with runs that force long carries.
+    fn decisions(seed: u32, count: usize) -> Vec<(usize, bool)> {
+        let mut state = seed;
+        (0..count)
+            .map(|i| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let context = (state >> 30) as usize;
+                (context, (state >> 8 & 0xfff) < [4, 40, 2048, 4090][context] || i % 1000 < 100)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn decisions_come_back_and_cost_about_their_entropy() {
+        for seed in 0..200 {
+            let decisions = decisions(seed, seed as usize * 37);
+            let mut encoder = RangeEncoder::new();
+            let mut models = [BitModel::NEW; 4];
+            for &(context, bit) in &decisions {
+                encoder.bit(&mut models[context], bit);
+                encoder.raw(3, context as u32);
+            }
+            let bytes = encoder.finish();
+            let mut decoder = RangeDecoder::new(&bytes);
+            let mut models = [BitModel::NEW; 4];
+            for &(context, bit) in &decisions {
+                assert_eq!(decoder.bit(&mut models[context], false), bit);
+                assert_eq!(decoder.raw(3, 0), context as u32);
+            }
+            assert!(!decoder.is_exhausted());
+            assert_eq!(decoder.unread(), 0);
+        }
+    }
+
+    #[test]
+    fn certain_decisions_cost_next_to_nothing() {
+        let mut encoder = RangeEncoder::new();
+        let mut model = BitModel::NEW;
+        for _ in 0..10_000 {
+            encoder.bit(&mut model, true);
+        }
+        assert!(encoder.finish().len() < 8);
+        let mut encoder = RangeEncoder::new();
+        encoder.bit(&mut BitModel { ..BitModel::NEW }, false);
+        assert!(encoder.finish().len() <= 1);
+    }
+
+    #[test]
+    fn probabilities_stay_inside() {
+        for bit in [false, true] {
+            let mut model = BitModel::NEW;
+            for _ in 0..100_000 {
+                model.update(bit);
+                assert!((32..=65_504).contains(&model.probability()));
+            }
+        }
+    }
+
+    #[test]
+    fn reading_past_the_end_is_noticed() {
+        let mut decoder = RangeDecoder::new(&[]);
+        assert!(!decoder.is_exhausted());
+        decoder.raw(32, 0);
+        assert!(decoder.is_exhausted());
+    }
+}

@@ -1,0 +1,397 @@
+//! The growing mesh of a slab: the syntax of a packet's payload, walked by writer and parser alike.
+//!
+//! In: a [`Side`], which codes decisions and, on the writer's side, knows the truth about the source mesh. Out: the
+//! coded mesh, vertices, wedges and tets numbered in the order of the stream. Forbidden here: bytes and framing.
+//!
+//! A packet completes the stars of all vertices near its time ([`super::hops`]), tet by tet over the open faces of the
+//! front. What no face reaches (in a mesh of several pieces) starts with a seed, a tet in plain numbers.
+
+mod wedges;
+
+use glam::IVec3;
+
+use super::colors::{ColorModels, Steps};
+use super::connectivity::{Apex, ConnectivityModels, Gate, choose_gate, code_apex, code_vertex_id};
+use super::front::{Front, Metric};
+use super::hops::{Hops, RINGS};
+use super::labels::LabelModels;
+use super::positions::{Behind, Bounds, PositionModels, code_free_position, code_position};
+use super::range_coder::{BitCoder, BitModel};
+use super::{Limits, MeshFault};
+use crate::mesh::{Domain, FACES, TetMesh, VertexId, volume6};
+
+/// End of a list.
+const NONE: u32 = u32::MAX;
+
+/// One side of the coding: the writer, who answers with the truth, or the parser, whose answers are ignored. Calls
+/// follow the syntax; each tet begins with `seed` or `behind`.
+pub(super) trait Side: BitCoder {
+    /// Whether a tet is left that no open face leads to. Makes it the current tet.
+    fn seed(&mut self) -> bool;
+    /// What lies behind the face of these corners of the coded tet `tet`. Makes the tet there the current one.
+    fn behind(&mut self, tet: u32, corners: [VertexId; 3]) -> Apex;
+    /// Corner number `corner` of the current tet, a seed, if it is coded; else it will be the next new vertex.
+    fn seed_corner(&mut self, corner: usize) -> Option<VertexId>;
+    /// Position of the next new vertex, and whether it is pinned.
+    fn new_vertex(&self) -> (IVec3, bool);
+    /// The next new vertex has this id.
+    fn vertex_coded(&mut self, id: VertexId);
+    /// Label of the current tet; `count`, the number of labels so far, for a new one.
+    fn label(&mut self, count: u32) -> u32;
+    /// Colour of the current tet at the coded vertex `vertex`.
+    fn color(&self, vertex: VertexId) -> Steps;
+    /// The current tet is complete and has the next number.
+    fn tet_coded(&mut self);
+    /// Whether the payload still holds what was read.
+    ///
+    /// # Errors
+    /// [`MeshFault::PayloadEnd`]
+    fn check(&self) -> Result<(), MeshFault>;
+}
+
+/// All adaptive models. They carry on from packet to packet within a slab.
+#[derive(Debug, Clone)]
+struct Models {
+    connectivity: ConnectivityModels,
+    positions: PositionModels,
+    labels: LabelModels,
+    colors: ColorModels,
+    /// Whether a seed follows.
+    seed: BitModel,
+    /// Whether a seed's corner is known.
+    seed_known: BitModel,
+}
+
+/// The coded part of a slab.
+#[derive(Debug, Clone)]
+pub(super) struct Slab {
+    /// What is coded, its duration provisional until the end of the slab is known: the least that exceeds all t.
+    mesh: TetMesh,
+    /// Colours of `mesh.wedges` in steps.
+    steps: Vec<Steps>,
+    color_step: u8,
+    bounds: Bounds,
+    /// Longest duration allowed, in frames.
+    max_duration: u32,
+    limits: Limits,
+    front: Front,
+    hops: Hops,
+    models: Box<Models>,
+    /// Last wedge of each label.
+    last_wedge: Vec<u32>,
+    /// Per vertex its youngest wedge, per wedge the next older one of its vertex.
+    wedge_head: Vec<u32>,
+    wedge_next: Vec<u32>,
+    /// Per vertex the youngest (tet, corner) as 4 tet + corner, and per such slot the next older one.
+    star_head: Vec<u32>,
+    star_next: Vec<[u32; 4]>,
+    /// Vertices of each tet: the mesh has them only by way of its wedges.
+    corners: Vec<[VertexId; 4]>,
+    /// Per vertex the hop that its neighbours have been told, and its youngest slot then.
+    passed_on: Vec<(u8, u32)>,
+    /// Lengths of the mesh's arrays, and its duration, when the last packet was complete.
+    complete: Complete,
+}
+
+/// How much of a mesh is complete.
+#[derive(Debug, Clone, Copy, Default)]
+struct Complete {
+    vertices: usize,
+    wedges: usize,
+    tets: usize,
+    duration: u32,
+}
+
+/// What a slab is made for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SlabParams {
+    /// The box; its duration is not used.
+    pub(super) domain: Domain,
+    /// Longest duration allowed, in frames.
+    pub(super) max_duration: u32,
+    /// Quantisation step of colours, in 1/16 of a level.
+    pub(super) color_step: u8,
+    /// Scale of time in the metric of angles.
+    pub(super) time_shift: i8,
+    /// Bounds on counts.
+    pub(super) limits: Limits,
+}
+
+impl Slab {
+    pub(super) fn new(params: SlabParams) -> Self {
+        let domain = Domain { duration: 1, ..params.domain };
+        Self {
+            mesh: TetMesh::empty(domain),
+            steps: Vec::new(),
+            color_step: params.color_step,
+            bounds: Bounds { domain, top_known: false },
+            max_duration: params.max_duration,
+            limits: params.limits,
+            front: Front::new(Metric::new(params.time_shift)),
+            hops: Hops::new(),
+            models: Box::new(Models {
+                connectivity: ConnectivityModels::NEW,
+                positions: PositionModels::NEW,
+                labels: LabelModels::NEW,
+                colors: ColorModels::NEW,
+                seed: BitModel::NEW,
+                seed_known: BitModel::NEW,
+            }),
+            last_wedge: Vec::new(),
+            wedge_head: Vec::new(),
+            wedge_next: Vec::new(),
+            star_head: Vec::new(),
+            star_next: Vec::new(),
+            corners: Vec::new(),
+            passed_on: Vec::new(),
+            complete: Complete { duration: 1, ..Complete::default() },
+        }
+    }
+
+    /// What is coded so far.
+    pub(super) fn mesh(&self) -> &TetMesh {
+        &self.mesh
+    }
+
+    /// The mesh as it was after the last packet that was coded without an error.
+    pub(super) fn into_complete_mesh(mut self) -> TetMesh {
+        let Complete { vertices, wedges, tets, duration } = self.complete;
+        self.mesh.positions.truncate(vertices);
+        self.mesh.pinned.truncate(vertices);
+        self.mesh.wedges.truncate(wedges);
+        self.mesh.tets.truncate(tets);
+        self.mesh.domain.duration = duration;
+        self.mesh
+    }
+
+    /// Notes that a packet is complete.
+    pub(super) fn keep(&mut self) {
+        self.complete = Complete {
+            vertices: self.mesh.positions.len(),
+            wedges: self.mesh.wedges.len(),
+            tets: self.mesh.tets.len(),
+            duration: self.mesh.domain.duration,
+        };
+    }
+
+    /// Codes one packet: every tet that the hop rule asks for when vertices before frame `low_frames` are low.
+    ///
+    /// # Errors
+    /// A mesh that no slab may have; what was coded before stands.
+    pub(super) fn code_packet(&mut self, side: &mut impl Side, low_frames: u32) -> Result<(), MeshFault> {
+        self.hops.begin_packet(low_frames);
+        loop {
+            while let Some((vertex, hop)) = self.hops.next() {
+                while let Some(gate) = choose_gate(&self.front, &self.mesh, vertex) {
+                    self.close_gate(side, &gate)?;
+                }
+                self.pass_hop_on(vertex, hop);
+            }
+            let seed = side.seed();
+            if !side.bit(&mut self.models.seed, seed) {
+                return side.check();
+            }
+            self.code_seed(side)?;
+        }
+    }
+
+    /// The slab ends at `duration` frames.
+    ///
+    /// # Errors
+    /// Vertices beyond it, or another end known before.
+    pub(super) fn end_at(&mut self, duration: u32) -> Result<(), MeshFault> {
+        let bits = self.bounds.domain.subpixel_bits;
+        if duration == 0 || duration > self.max_duration {
+            return Err(MeshFault::Range {
+                field: "duration",
+                low: 1,
+                high: self.max_duration.into(),
+                found: duration.into(),
+            });
+        }
+        let top = (duration as i32) << bits;
+        let known = (self.bounds.domain.duration as i32) << bits;
+        if self.bounds.top_known && known != top {
+            return Err(MeshFault::Top { expected: known, found: top });
+        }
+        if let Some(highest) = self.mesh.positions.iter().map(|p| p.z).max().filter(|&t| t > top) {
+            return Err(MeshFault::Top { expected: highest, found: top });
+        }
+        self.bounds.domain.duration = duration;
+        self.bounds.top_known = true;
+        self.mesh.domain.duration = duration;
+        Ok(())
+    }
+
+    /// The neighbours of `vertex`, whose star is complete, are one edge farther. Tets that were there the last time
+    /// are passed over, so that all visits together are linear in the star.
+    fn pass_hop_on(&mut self, vertex: VertexId, hop: u8) {
+        let youngest = self.star_head[vertex.index()];
+        if hop == RINGS {
+            return;
+        }
+        let (told, until) = std::mem::replace(&mut self.passed_on[vertex.index()], (hop, youngest));
+        let until = if told == hop { until } else { NONE };
+        let mut slot = youngest;
+        while slot != until {
+            let (tet, corner) = (slot as usize / 4, slot as usize % 4);
+            for neighbour in self.corners[tet] {
+                self.hops.lower(neighbour, hop + 1);
+            }
+            slot = self.star_next[tet][corner];
+        }
+    }
+
+    /// Codes what lies behind an open face.
+    fn close_gate(&mut self, side: &mut impl Side, gate: &Gate) -> Result<(), MeshFault> {
+        side.check()?;
+        if self.is_walled(gate.corners) {
+            // It lies on t = duration, which was not known when it was opened.
+            self.front.remove(gate.face);
+            return Ok(());
+        }
+        let before = self.front.face(gate.face).tet;
+        let truth = side.behind(before, gate.corners);
+        let around = (&self.front, &self.mesh);
+        let apex = match code_apex(side, &mut self.models.connectivity, around, gate, truth)? {
+            Apex::Known(vertex) => vertex,
+            Apex::New => self.code_apex_vertex(side, before, gate.corners)?,
+            nothing @ (Apex::Hole | Apex::Top) => {
+                if nothing == Apex::Top {
+                    self.end_at_face(gate.corners)?;
+                }
+                self.front.remove(gate.face);
+                return Ok(());
+            }
+        };
+        let [a, b, c] = gate.corners;
+        self.attach(side, [a, b, c, apex], Some(gate.face))
+    }
+
+    /// The slab ends at the t of this face.
+    fn end_at_face(&mut self, corners: [VertexId; 3]) -> Result<(), MeshFault> {
+        let [t, second, third] = corners.map(|v| self.mesh.positions[v.index()].z);
+        let bits = self.bounds.domain.subpixel_bits;
+        for found in [second, third, t >> bits << bits] {
+            if found != t {
+                return Err(MeshFault::Top { expected: t, found });
+            }
+        }
+        self.end_at((t >> bits) as u32)
+    }
+
+    /// Whether the face lies on a side of the box, as far as its sides are known.
+    fn is_walled(&self, corners: [VertexId; 3]) -> bool {
+        let far = self.bounds.far();
+        let [a, b, c] = corners.map(|v| self.mesh.positions[v.index()]);
+        let all_at = |axis: usize, place: i32| a[axis] == place && b[axis] == place && c[axis] == place;
+        (0..3).any(|axis| all_at(axis, 0))
+            || (0..2).any(|axis| all_at(axis, far[axis]))
+            || (self.bounds.top_known && all_at(2, far.z))
+    }
+
+    /// Codes the new vertex behind a gate.
+    fn code_apex_vertex(
+        &mut self,
+        side: &mut impl Side,
+        before: u32,
+        gate: [VertexId; 3],
+    ) -> Result<VertexId, MeshFault> {
+        let corners = self.corners[before as usize];
+        let opposite = corners.into_iter().find(|v| !gate.contains(v)).unwrap_or(corners[0]);
+        let at = |v: VertexId| self.mesh.positions[v.index()];
+        let behind = Behind { gate: gate.map(at), opposite: at(opposite) };
+        let (truth, pinned) = side.new_vertex();
+        self.check_inside(truth)?;
+        let position = code_position(side, &mut self.models.positions, &behind, &self.bounds, truth)?;
+        self.push_vertex(side, position, pinned)
+    }
+
+    /// Codes the pin of the next vertex, and appends it.
+    fn push_vertex(&mut self, side: &mut impl Side, position: IVec3, pinned: bool) -> Result<VertexId, MeshFault> {
+        self.check_inside(position)?;
+        if position.z > (self.max_duration as i32) << self.bounds.domain.subpixel_bits {
+            return Err(MeshFault::TooMany { field: "frames in a slab", limit: self.max_duration });
+        }
+        if self.mesh.positions.len() >= self.limits.max_vertices as usize {
+            return Err(MeshFault::TooMany { field: "vertices", limit: self.limits.max_vertices });
+        }
+        let pinned = self.models.positions.code_pinned(side, pinned);
+        let vertex = self.mesh.push_vertex(position);
+        self.mesh.pinned[vertex.index()] = pinned;
+        self.front.push_vertex();
+        self.wedge_head.push(NONE);
+        self.star_head.push(NONE);
+        self.passed_on.push((u8::MAX, NONE));
+        let frame = (position.z >> self.bounds.domain.subpixel_bits) as u32;
+        self.hops.push_vertex(frame);
+        if !self.bounds.top_known {
+            self.mesh.domain.duration = self.mesh.domain.duration.max(frame + 1);
+        }
+        side.vertex_coded(vertex);
+        Ok(vertex)
+    }
+
+    fn check_inside(&self, position: IVec3) -> Result<(), MeshFault> {
+        if position.cmpge(IVec3::ZERO).all() && position.cmple(self.bounds.far()).all() {
+            return Ok(());
+        }
+        let vertex = self.mesh.positions.len() as u32;
+        Err(MeshFault::Outside { vertex, position: position.to_array() })
+    }
+
+    /// Codes a tet that no open face leads to.
+    fn code_seed(&mut self, side: &mut impl Side) -> Result<(), MeshFault> {
+        side.check()?;
+        let mut corners = [VertexId(0); 4];
+        for (corner, slot) in corners.iter_mut().enumerate() {
+            let truth = side.seed_corner(corner);
+            *slot = if side.bit(&mut self.models.seed_known, truth.is_some()) {
+                code_vertex_id(side, truth.unwrap_or(VertexId(0)), self.mesh.positions.len() as u32)?
+            } else {
+                let (position, pinned) = side.new_vertex();
+                self.check_inside(position)?;
+                let position = code_free_position(side, &self.bounds, position);
+                self.push_vertex(side, position, pinned)?
+            };
+        }
+        self.attach(side, corners, None)?;
+        corners.into_iter().for_each(|v| self.hops.revisit(v));
+        Ok(())
+    }
+
+    /// Appends a tet with its label and colours, and moves the front over it. `gate` is the open face it was found by.
+    fn attach(&mut self, side: &mut impl Side, corners: [VertexId; 4], gate: Option<u32>) -> Result<(), MeshFault> {
+        let tet = self.mesh.tets.len() as u32;
+        if tet >= self.limits.max_tets {
+            return Err(MeshFault::TooMany { field: "tets", limit: self.limits.max_tets });
+        }
+        let positions = corners.map(|v| self.mesh.positions[v.index()]);
+        let volume6 = volume6(positions[0], positions[1], positions[2], positions[3]);
+        if volume6 <= 0 {
+            return Err(MeshFault::NotPositive { tet, volume6 });
+        }
+        let facing = FACES.map(|face| {
+            // The gate is face 3, opposite the apex.
+            if face == FACES[3] && gate.is_some() { gate } else { self.front.facing(face.map(|c| corners[c])) }
+        });
+        let label = self.code_tet_label(side, corners, gate, facing)?;
+        let wedges = self.code_wedges(side, corners, label)?;
+        self.mesh.tets.push(wedges);
+        self.corners.push(corners);
+        self.star_next.push([0, 1, 2, 3].map(|corner| {
+            let head = &mut self.star_head[corners[corner].index()];
+            std::mem::replace(head, tet * 4 + corner as u32)
+        }));
+        for (face, closed) in FACES.into_iter().zip(facing) {
+            let corners = face.map(|c| corners[c]);
+            match closed {
+                Some(closed) => self.front.remove(closed),
+                None if self.is_walled(corners) => {}
+                None => self.front.insert(corners, face.map(|c| positions[c]), tet)?,
+            }
+        }
+        side.tet_coded();
+        Ok(())
+    }
+}

@@ -1,0 +1,135 @@
+//! Labels and wedges of the tets of a growing slab.
+//!
+//! In: a tet's corners. Out: its label and wedges, coded where they are new. Forbidden here: moving the front.
+
+use crate::bitstream::MeshFault;
+use crate::bitstream::colors::{Around, Steps, code_color, from_steps};
+use crate::bitstream::labels::{LabelContext, code_label};
+use crate::mesh::{VertexId, Wedge, WedgeId};
+use crate::video::Label;
+
+use super::{Side, Slab};
+
+/// Labels that may meet at one vertex; bounds the time to find one of its wedges.
+const MAX_WEDGES_A_VERTEX: usize = 1 << 8;
+
+/// Wedges of a corner that are looked at to find candidates for a label.
+const LABEL_SCAN: usize = 8;
+
+impl Slab {
+    /// Codes the label of the tet with these corners; `facing` are the open faces that it will close.
+    pub(super) fn code_tet_label(
+        &mut self,
+        side: &mut impl Side,
+        corners: [VertexId; 4],
+        gate: Option<u32>,
+        facing: [Option<u32>; 4],
+    ) -> Result<u32, MeshFault> {
+        let label_of = |face: u32| self.mesh.tet_label(self.front.face(face).tet as usize).0;
+        let mut context = LabelContext { before: gate.map(label_of), ..LabelContext::default() };
+        for other in facing.into_iter().flatten().filter(|&face| Some(face) != gate) {
+            if Some(label_of(other)) == context.before {
+                context.agreeing = (context.agreeing + 1).min(3);
+            } else {
+                context.differing = (context.differing + 1).min(3);
+            }
+        }
+        // Other labels with the number of corners that have them.
+        let mut others = [(0, 0); 4 * LABEL_SCAN];
+        let mut length = 0;
+        for (corner, vertex) in corners.into_iter().enumerate() {
+            let mut wedges = 0;
+            for label in self.wedges_at(vertex).take(LABEL_SCAN).map(|w| self.mesh.wedges[w].label.0) {
+                wedges += 1;
+                if Some(label) == context.before {
+                    continue;
+                }
+                match others[..length].iter_mut().find(|(known, _)| *known == label) {
+                    Some((_, count)) => *count += 1,
+                    None => {
+                        others[length] = (label, 1);
+                        length += 1;
+                    }
+                }
+            }
+            context.boundary_corners += usize::from(corner < 3 && wedges > 1);
+        }
+        others[..length].sort_unstable_by_key(|&(label, count)| (u32::MAX - count, label));
+        context.candidates = &others[..length];
+        let count = self.last_wedge.len() as u32;
+        let truth = side.label(count);
+        let label = code_label(side, &mut self.models.labels, &context, count, truth)?;
+        if label >= self.limits.max_labels {
+            return Err(MeshFault::TooMany { field: "labels", limit: self.limits.max_labels });
+        }
+        Ok(label)
+    }
+
+    /// Wedges of `vertex`, the youngest first.
+    fn wedges_at(&self, vertex: VertexId) -> impl Iterator<Item = usize> + '_ {
+        let mut wedge = self.wedge_head[vertex.index()];
+        std::iter::from_fn(move || {
+            let found = wedge as usize;
+            wedge = *self.wedge_next.get(found)?;
+            Some(found)
+        })
+    }
+
+    /// The tet's wedges; codes the colours of those that do not exist yet.
+    pub(super) fn code_wedges(
+        &mut self,
+        side: &mut impl Side,
+        corners: [VertexId; 4],
+        label: u32,
+    ) -> Result<[WedgeId; 4], MeshFault> {
+        let mut wedges = [None; 4];
+        for (slot, vertex) in wedges.iter_mut().zip(corners) {
+            let mut looked_at = 0;
+            *slot = self.wedges_at(vertex).inspect(|_| looked_at += 1).find(|&w| self.mesh.wedges[w].label.0 == label);
+            if slot.is_none() && looked_at >= MAX_WEDGES_A_VERTEX {
+                return Err(MeshFault::TooMany { field: "labels at a vertex", limit: MAX_WEDGES_A_VERTEX as u32 });
+            }
+        }
+        for corner in 0..4 {
+            if wedges[corner].is_some() {
+                continue;
+            }
+            let vertex = corners[corner];
+            let around = self.around(&wedges, vertex, label);
+            let truth = side.color(vertex);
+            let steps = code_color(side, &mut self.models.colors, &around, self.color_step, truth)?;
+            wedges[corner] = Some(self.push_wedge(vertex, label, steps)?);
+        }
+        Ok(wedges.map(|w| WedgeId(w.unwrap_or(0) as u32)))
+    }
+
+    /// What the colour of a new wedge is predicted from.
+    fn around(&self, wedges: &[Option<usize>; 4], vertex: VertexId, label: u32) -> Around {
+        let of_label = || self.last_wedge.get(label as usize).map(|&w| Around::Label(self.steps[w as usize]));
+        let of_vertex = || self.wedges_at(vertex).next().map_or([0; 3], |w| self.steps[w]);
+        let at = |v: VertexId| self.mesh.positions[v.index()];
+        // By inverse square distance in the metric of the front.
+        let weight = |w: usize| {
+            let d = self.front.metric().vector(at(vertex), at(self.mesh.wedges[w].vertex));
+            1.0 / (d.x * d.x + d.y * d.y + d.z * d.z)
+        };
+        Around::of_tet(wedges.iter().flatten().map(|&w| (self.steps[w], weight(w))))
+            .or_else(of_label)
+            .unwrap_or_else(|| Around::Other(of_vertex()))
+    }
+
+    fn push_wedge(&mut self, vertex: VertexId, label: u32, steps: Steps) -> Result<usize, MeshFault> {
+        if self.mesh.wedges.len() >= self.limits.max_wedges as usize {
+            return Err(MeshFault::TooMany { field: "wedges", limit: self.limits.max_wedges });
+        }
+        let color = from_steps(steps, self.color_step);
+        let wedge = self.mesh.push_wedge(Wedge { vertex, label: Label(label), color });
+        self.steps.push(steps);
+        self.wedge_next.push(std::mem::replace(&mut self.wedge_head[vertex.index()], wedge.0));
+        match self.last_wedge.get_mut(label as usize) {
+            Some(last) => *last = wedge.0,
+            None => self.last_wedge.push(wedge.0),
+        }
+        Ok(wedge.index())
+    }
+}

@@ -1,0 +1,177 @@
+//! The encoder's settings: names, defaults and ranges live here once; elements and tools read them.
+
+use super::EncodeError;
+use crate::bitstream::{Fraction, Limits, SequenceHeader};
+use crate::video::Frame;
+
+/// What the error quadrics of the simplification measure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ErrorMetric {
+    /// Squared colour error at a fixed (x, y, t).
+    #[default]
+    Color,
+    /// The paper's: squared distance in (x, y, t, r, g, b), §IV-A.
+    Paper,
+}
+
+/// How an [`Encoder`](super::Encoder) works. `EncoderConfig::new` gives the defaults.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EncoderConfig {
+    /// Width of the pictures in pixels.
+    pub width: u32,
+    /// Height of the pictures in pixels.
+    pub height: u32,
+    /// Frames a second; 0/1 where there is no fixed rate.
+    pub frame_rate: Fraction,
+    /// Width of a pixel over its height.
+    pub pixel_aspect_ratio: Fraction,
+    /// Vertices of the control mesh over pixels of the source (§IV-A), [`Self::SIMPLIFICATION_RATIO`].
+    pub simplification_ratio: f64,
+    /// Mean absolute error per channel to simplify up to, in 8-bit levels; 0: off, the ratio decides.
+    pub target_error: f64,
+    /// Length T of the sliding window in frames (§VI), [`Self::WINDOW`].
+    pub window: u32,
+    /// Most frames from one keyframe to the next, [`Self::KEY_INT_MAX`].
+    pub key_int_max: u32,
+    /// Mean number of superpixels a frame; 0: chosen by content; 1: no discontinuities, which reaches the lowest error at
+    /// a given ratio as long as surfaces are fitted to pixel labels (docs/benchmarks.md).
+    pub superpixels: u32,
+    /// Levels of subdivision that the decoder is to draw with, and the fit fits for: 0 to 2.
+    pub subdivision_levels: u8,
+    /// What the quadrics measure.
+    pub error_metric: ErrorMetric,
+    /// Worker threads; 0: all cores. Bytes do not depend on it.
+    pub threads: usize,
+}
+
+impl EncoderConfig {
+    /// Range of `simplification_ratio`.
+    pub const SIMPLIFICATION_RATIO: std::ops::RangeInclusive<f64> = 0.0005..=1.0;
+    /// Range of `target_error`.
+    pub const TARGET_ERROR: std::ops::RangeInclusive<f64> = 0.0..=255.0;
+    /// Range of `window`.
+    pub const WINDOW: std::ops::RangeInclusive<u32> = 4..=600;
+    /// Range of `key_int_max`.
+    pub const KEY_INT_MAX: std::ops::RangeInclusive<u32> = 1..=600;
+    /// Range of `superpixels`.
+    pub const SUPERPIXELS: std::ops::RangeInclusive<u32> = 0..=10_000;
+    /// Range of `subdivision_levels`.
+    pub const SUBDIVISION_LEVELS: std::ops::RangeInclusive<u8> = 0..=2;
+
+    /// Defaults for pictures of this size at 25 frames a second.
+    pub fn new(width: u32, height: u32) -> Self {
+        Self {
+            width,
+            height,
+            frame_rate: Fraction { numerator: 25, denominator: 1 },
+            pixel_aspect_ratio: Fraction { numerator: 1, denominator: 1 },
+            simplification_ratio: 0.01,
+            target_error: 0.0,
+            window: 10,
+            key_int_max: 60,
+            superpixels: 1,
+            subdivision_levels: 1,
+            error_metric: ErrorMetric::Color,
+            threads: 0,
+        }
+    }
+
+    /// Checks every field against its range.
+    ///
+    /// # Errors
+    /// [`EncodeError::Setting`] names the first field out of range.
+    pub fn validate(&self) -> Result<(), EncodeError> {
+        if Frame::check_size(self.width, self.height).is_err() {
+            let found = format!("{}x{}", self.width, self.height);
+            return Err(setting("width x height", &(1..=crate::video::MAX_FRAME_SIDE), found));
+        }
+        let in_range = |field, value: u32, range: std::ops::RangeInclusive<u32>| {
+            if range.contains(&value) { Ok(()) } else { Err(setting(field, &range, value)) }
+        };
+        if !Self::SIMPLIFICATION_RATIO.contains(&self.simplification_ratio) {
+            return Err(setting("simplification_ratio", &Self::SIMPLIFICATION_RATIO, self.simplification_ratio));
+        }
+        if !Self::TARGET_ERROR.contains(&self.target_error) {
+            return Err(setting("target_error", &Self::TARGET_ERROR, self.target_error));
+        }
+        if self.frames_within_limits() == 0 {
+            let found = format!("{} at {}x{}", self.simplification_ratio, self.width, self.height);
+            return Err(setting("simplification_ratio x width x height", &(0..=Limits::default().max_vertices), found));
+        }
+        in_range("window", self.window, Self::WINDOW)?;
+        in_range("key_int_max", self.key_int_max, Self::KEY_INT_MAX)?;
+        in_range("superpixels", self.superpixels, Self::SUPERPIXELS)?;
+        let levels = Self::SUBDIVISION_LEVELS;
+        in_range(
+            "subdivision_levels",
+            self.subdivision_levels.into(),
+            (*levels.start()).into()..=(*levels.end()).into(),
+        )?;
+        in_range("frame_rate.denominator", self.frame_rate.denominator, 1..=u32::MAX)?;
+        in_range("pixel_aspect_ratio.numerator", self.pixel_aspect_ratio.numerator, 1..=u32::MAX)?;
+        in_range("pixel_aspect_ratio.denominator", self.pixel_aspect_ratio.denominator, 1..=u32::MAX)
+    }
+
+    /// Most frames of a slab: `key_int_max`, or fewer where a slab's mesh would be more than decoders accept.
+    pub fn slab_frames(&self) -> u32 {
+        self.key_int_max.min(self.frames_within_limits())
+    }
+
+    /// Frames whose mesh decoders accept, with room for the plane that joins the next slab.
+    fn frames_within_limits(&self) -> u32 {
+        let limits = Limits::default();
+        let vertices = f64::from(limits.max_vertices).min(f64::from(limits.max_tets) / TETS_A_VERTEX);
+        let a_frame = self.simplification_ratio * f64::from(self.width) * f64::from(self.height);
+        (vertices / a_frame - 1.0) as u32
+    }
+
+    /// The sequence header of streams made with these settings.
+    pub fn header(&self) -> SequenceHeader {
+        SequenceHeader {
+            width: self.width,
+            height: self.height,
+            frame_rate: self.frame_rate,
+            pixel_aspect_ratio: self.pixel_aspect_ratio,
+            subpixel_bits: SUBPIXEL_BITS,
+            subdivision_levels: self.subdivision_levels,
+            color_step: COLOR_STEP,
+        }
+    }
+}
+
+/// Tets a vertex of a simplified mesh, with a margin: 5 to 6.5 on natural clips.
+const TETS_A_VERTEX: f64 = 7.0;
+/// Positions are rounded to 1/8 px and 1/8 frame: costs 0.1 dB (docs/benchmarks.md).
+const SUBPIXEL_BITS: u8 = 3;
+/// Colours are rounded to 2 levels, in sixteenths of a level.
+const COLOR_STEP: u8 = 32;
+
+fn setting<T: std::fmt::Debug>(
+    field: &'static str,
+    expected: &std::ops::RangeInclusive<T>,
+    found: impl std::fmt::Display,
+) -> EncodeError {
+    let expected = format!("{:?} to {:?}", expected.start(), expected.end());
+    EncodeError::Setting { field, expected, found: found.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_the_field_out_of_range() {
+        let good = EncoderConfig::new(320, 240);
+        assert_eq!(good.validate(), Ok(()));
+        let field = |config: EncoderConfig| match config.validate() {
+            Err(EncodeError::Setting { field, .. }) => field,
+            other => panic!("expected a refusal, found {other:?}"),
+        };
+        assert_eq!(field(EncoderConfig::new(0, 240)), "width x height");
+        assert_eq!(field(EncoderConfig { simplification_ratio: f64::NAN, ..good.clone() }), "simplification_ratio");
+        assert_eq!(field(EncoderConfig { target_error: -1.0, ..good.clone() }), "target_error");
+        assert_eq!(field(EncoderConfig { window: 3, ..good.clone() }), "window");
+        assert_eq!(field(EncoderConfig { key_int_max: 0, ..good.clone() }), "key_int_max");
+        assert_eq!(field(EncoderConfig { subdivision_levels: 3, ..good }), "subdivision_levels");
+    }
+}

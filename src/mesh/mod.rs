@@ -1,0 +1,18 @@
+//! Geometry: the control mesh, its adjacency, exact predicates, validation.
+//!
+//! In: positions, wedges and tets. Out: the same, with topology and checks. Forbidden here: pixels, coding,
+//! anything that decides what the mesh should look like. Of our own rooms only `video::Label` is known.
+
+mod adjacency;
+mod domain;
+mod ids;
+mod predicates;
+mod tet_mesh;
+mod validate;
+
+pub use adjacency::{FACES, StarTable};
+pub use domain::{Domain, Sides};
+pub use ids::{VertexId, WedgeId};
+pub use predicates::volume6;
+pub use tet_mesh::{TetMesh, Wedge};
+pub use validate::{MeshError, validate};

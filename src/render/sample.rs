@@ -1,0 +1,86 @@
+//! Which fine tet a source pixel's centre lies in, and where: the rows of a fit's matrix.
+
+use std::ops::Range;
+
+use glam::IVec3;
+
+use super::draw::triangulate;
+use super::scan::{GridPoint, scan};
+use super::slice::{SLICES, above, cross};
+use super::subdivide::Refined;
+use super::view::{View, Viewport, plane};
+use crate::mesh::Domain;
+
+/// Pixel centres of some rows of a source frame in a refined mesh, row-major.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PixelSamples {
+    /// The fine tet that is shown at the pixel, or [`PixelSamples::UNCOVERED`].
+    pub tet: Vec<u32>,
+    /// Barycentric weights of the tet's corners at the centre: within [0, 1], adding up to 1. Zero where uncovered.
+    pub weights: Vec<[f32; 4]>,
+}
+
+impl PixelSamples {
+    /// Stands for a tet where a partial mesh has none.
+    pub const UNCOVERED: u32 = u32::MAX;
+}
+
+/// Samples the plane at time `frame` (frames since the slab's first) at the centres of the source's pixels in `rows`
+/// (cut to the picture's height). At each pixel it is the tet that [`super::Scene::draw`] would show at the size of
+/// the source.
+pub fn sample(refined: &Refined, domain: &Domain, frame: f64, rows: Range<u32>) -> PixelSamples {
+    let view = View::new(domain, Viewport::whole(domain), (domain.width, domain.height));
+    let t = plane(domain, frame);
+    let rows = rows.start.min(domain.height) as i32..rows.end.min(domain.height) as i32;
+    let count = rows.len() * domain.width as usize;
+    let mut samples = PixelSamples { tet: vec![PixelSamples::UNCOVERED; count], weights: vec![[0.0; 4]; count] };
+    for tet in 0..refined.tets.len() {
+        let corners = refined.tet_positions(tet);
+        sample_tet(corners, t, &view, rows.clone(), |row, column, weights| {
+            let pixel = (row - rows.start) as usize * domain.width as usize + column;
+            samples.tet[pixel] = tet as u32;
+            samples.weights[pixel] = weights;
+        });
+    }
+    samples
+}
+
+/// Calls `pixel(row, column, weights)` for each centre in a tet's slice.
+fn sample_tet(tet: [IVec3; 4], t: i32, view: &View, rows: Range<i32>, mut pixel: impl FnMut(i32, usize, [f32; 4])) {
+    let ends = SLICES[above(tet, t)];
+    let mut polygon = [Default::default(); 4];
+    let mut parts = [0.0; 4];
+    for (i, &[below, above]) in ends.iter().enumerate() {
+        let (part, place) = cross(tet[below as usize], tet[above as usize], t);
+        parts[i] = part;
+        polygon[i] = (place, glam::Vec3::ZERO);
+    }
+    triangulate(view, &polygon[..ends.len()], |triangle, picked| {
+        let Some(own) = triangle.rows(view) else { return };
+        let both = own.start.max(rows.start)..own.end.min(rows.end);
+        scan(triangle.corners, both, |row, columns| {
+            for column in columns.start.max(0)..columns.end.min(i64::from(view.columns)) {
+                let share = planar_weights(triangle.corners, [column as f64 + 0.5, f64::from(row) + 0.5]);
+                let mut weights = [0.0f64; 4];
+                for (share, &corner) in share.into_iter().zip(&picked) {
+                    let [below, above] = ends[corner];
+                    weights[below as usize] += share * (1.0 - parts[corner]);
+                    weights[above as usize] += share * parts[corner];
+                }
+                pixel(row, column as usize, weights.map(|w| w as f32));
+            }
+        });
+    });
+}
+
+/// Barycentric weights of a place (pixels) in a positive triangle; rounding is not let out of [0, 1].
+fn planar_weights(corners: [GridPoint; 3], [x, y]: [f64; 2]) -> [f64; 3] {
+    let corners = corners.map(GridPoint::to_px);
+    let area = |i: usize, j: usize| {
+        let [[ax, ay], [bx, by]] = [corners[i], corners[j]];
+        ((ax - x) * (by - y) - (ay - y) * (bx - x)).max(0.0)
+    };
+    let areas = [area(1, 2), area(2, 0), area(0, 1)];
+    let sum: f64 = areas.iter().sum();
+    if sum > 0.0 { areas.map(|a| a / sum) } else { [1.0 / 3.0; 3] }
+}

@@ -1,0 +1,184 @@
+//! A slab as it is drawn: the control mesh as far as it has come, and the levels refined so far.
+
+use glam::{DVec2, IVec3, Vec3};
+
+use super::complex::{Complex, FINE_BITS};
+use super::draw::Placed;
+use super::parallel::fill_chunks;
+use super::refiner::{FineNode, Refiner, Span, fine_color};
+use super::second::Second;
+use super::slice::{SLICES, above, blend, cross};
+use crate::mesh::{Domain, TetMesh};
+
+/// First-level children that the second level may hold before it starts anew; or four times what a picture needs, if
+/// that is more. About 150 bytes each.
+const SECOND_TETS: usize = 1 << 19;
+
+/// Tets that a thread slices at a time.
+pub(super) const CHUNK: usize = 512;
+
+/// A slab's control mesh, ready to be cut by planes. It grows with the mesh; what was refined is kept.
+#[derive(Debug)]
+pub struct Scene {
+    domain: Domain,
+    complex: Complex,
+    /// One a node, in fine levels.
+    colors: Vec<IVec3>,
+    spans: Vec<Span>,
+    /// Level 1; empty until it is first asked for.
+    refiner: Refiner,
+    /// Level 2, around the planes lately drawn.
+    second: Second,
+    /// Triangles of the last picture; kept for their memory.
+    pub(super) triangles: Vec<Vec<Placed>>,
+}
+
+/// A polygon's corner: its place in fine units, and its colour.
+pub(super) type Corner = (DVec2, Vec3);
+
+impl Scene {
+    /// A scene without tets.
+    pub fn new(domain: Domain) -> Self {
+        Self {
+            domain,
+            complex: Complex::default(),
+            colors: Vec::new(),
+            spans: Vec::new(),
+            refiner: Refiner::default(),
+            second: Second::default(),
+            triangles: Vec::new(),
+        }
+    }
+
+    /// The box of the slab.
+    pub fn domain(&self) -> &Domain {
+        &self.domain
+    }
+
+    /// The smallest difference of times that can be drawn, in frames.
+    pub fn time_step(&self) -> f64 {
+        1.0 / (f64::from(self.domain.unit()) * f64::from(1 << FINE_BITS))
+    }
+
+    /// Takes in what `mesh` gained since the last call. It must be the same mesh, changed at the ends of its arrays
+    /// only; its duration may change.
+    pub fn extend(&mut self, mesh: &TetMesh) {
+        let (nodes, tets) = (self.complex.nodes.len(), self.complex.tets.len());
+        self.domain = mesh.domain;
+        let moved = self.complex.extend(mesh);
+        if !moved.is_empty() {
+            self.refiner.forget_around(&self.complex, &moved);
+            self.second = Second::default();
+        }
+        self.colors.extend(mesh.wedges[nodes..].iter().map(|wedge| fine_color(wedge.color)));
+        let complex = &self.complex;
+        let span = |corners: &[u32; 4]| Span::of(corners.map(|node| complex.position(node)));
+        self.spans.extend(self.complex.tets[tets..].iter().map(span));
+    }
+
+    /// Cuts the scene, subdivided `levels` times, at `t` (fine units). `make` appends to a list what the caller keeps
+    /// of each polygon, given the control tet and the corners. Lists, one after the other, hold polygons in the order
+    /// of control tets and of children; what was in them is gone.
+    pub(super) fn cut<P: Send>(
+        &mut self,
+        t: i32,
+        levels: u8,
+        lists: &mut Vec<Vec<P>>,
+        make: impl Fn(&mut Vec<P>, u32, &[Corner]) + Sync + Send,
+    ) {
+        if levels == 0 {
+            let tets = (0..self.spans.len() as u32).filter(|&tet| self.spans[tet as usize].is_cut(t));
+            let tets: Vec<u32> = tets.collect();
+            return collect(lists, &tets, |polygons, tet| {
+                let nodes = self.complex.tets[tet as usize].map(|node| self.node(node));
+                slice(nodes, t, |corners| make(polygons, tet, corners));
+            });
+        }
+        self.refiner.extend(&self.complex);
+        if levels == 1 {
+            let tets = self.refiner.cut(&self.complex, &self.colors, t);
+            // The second level is not kept up to date here; it starts anew when it is next asked for.
+            if !self.refiner.take_changed().is_empty() {
+                self.second = Second::default();
+            }
+            return collect(lists, &tets, |polygons, tet| {
+                slice_children(&self.refiner, &self.complex, tet, t, |corners| make(polygons, tet, corners));
+            });
+        }
+        self.refine_twice(t);
+        let tets = self.second.cut(t);
+        let second = &self.second;
+        collect(lists, &tets, |polygons, tet| {
+            let (refiner, complex) = second.level();
+            slice_children(refiner, complex, tet, t, |corners| make(polygons, second.parent(tet), corners));
+        });
+    }
+
+    fn node(&self, node: u32) -> FineNode {
+        FineNode { position: self.complex.position(node), color: self.colors[node as usize] }
+    }
+
+    /// Brings the second level up to the plane at `t`.
+    ///
+    /// A second-level node lies within the hull of the first-level nodes around the corners of its control tet. So the
+    /// tets that may be cut are those with a corner whose star is cut; and they, with all tets around them, hold
+    /// everything that their masks reach.
+    fn refine_twice(&mut self, t: i32) {
+        let near = self.refiner.cut(&self.complex, &self.colors, t);
+        let once = self.grow(&near);
+        let twice = self.grow(&once);
+        self.refiner.refine(&self.complex, &self.colors, &twice);
+        let changed = self.refiner.take_changed();
+        if self.second.tet_count() > (4 * 8 * twice.len()).max(SECOND_TETS) {
+            self.second = Second::default();
+        }
+        self.second.update(&self.refiner, &changed);
+        for &tet in &twice {
+            self.second.push_children(&self.complex, &self.refiner, tet);
+        }
+    }
+
+    /// `tets` and all tets that share a vertex with one of them, ascending.
+    fn grow(&self, tets: &[u32]) -> Vec<u32> {
+        let mut seen = vec![false; self.complex.points.len()];
+        let mut grown = vec![false; self.complex.tets.len()];
+        for &tet in tets {
+            for point in self.complex.tets[tet as usize].map(|node| self.complex.point(node)) {
+                if !std::mem::replace(&mut seen[point as usize], true) {
+                    self.refiner.star(point).for_each(|tet| grown[tet as usize] = true);
+                }
+            }
+        }
+        (0..grown.len() as u32).filter(|&tet| grown[tet as usize]).collect()
+    }
+}
+
+/// Runs `work` on each of `tets`, on any number of threads.
+fn collect<P: Send>(lists: &mut Vec<Vec<P>>, tets: &[u32], work: impl Fn(&mut Vec<P>, u32) + Sync + Send) {
+    fill_chunks(lists, tets.len(), CHUNK, |list, run| tets[run].iter().for_each(|&tet| work(list, tet)));
+}
+
+/// Slices the children of a refined parent.
+#[inline]
+fn slice_children(refiner: &Refiner, complex: &Complex, tet: u32, t: i32, mut polygon: impl FnMut(&[Corner])) {
+    let nodes = refiner.ten(complex, tet);
+    for child in refiner.children(tet) {
+        slice(child.map(|i| nodes[i as usize]), t, &mut polygon);
+    }
+}
+
+/// Slices one tet.
+#[inline]
+fn slice(nodes: [FineNode; 4], t: i32, mut polygon: impl FnMut(&[Corner])) {
+    let edges = SLICES[above(nodes.map(|node| node.position), t)];
+    if edges.is_empty() {
+        return;
+    }
+    let mut corners = [Corner::default(); 4];
+    for (corner, ends) in corners.iter_mut().zip(edges) {
+        let [below, above] = ends.map(|end| &nodes[end as usize]);
+        let (part, place) = cross(below.position, above.position, t);
+        *corner = (place, blend(below.levels(), above.levels(), part));
+    }
+    polygon(&corners[..edges.len()]);
+}

@@ -1,0 +1,91 @@
+//! From fine units of a slab to the pixel grid of a surface.
+
+use thiserror::Error;
+
+use super::complex::FINE_BITS;
+use super::scan::{GRID_BITS, GridPoint};
+use crate::mesh::Domain;
+
+/// The part of the source picture to draw, in source pixels. It is stretched over the whole surface; what lies
+/// outside of the picture is drawn black.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Viewport {
+    /// Left edge.
+    pub x: f64,
+    /// Top edge.
+    pub y: f64,
+    /// Width, > 0.
+    pub width: f64,
+    /// Height, > 0.
+    pub height: f64,
+}
+
+/// A viewport that cannot be drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error("viewport: expected finite edges up to 2^20 px and sides of 2^-12 to 2^20 px, found {0:?}")]
+pub struct ViewportError(pub Viewport);
+
+impl Viewport {
+    /// The whole picture of a slab.
+    pub fn whole(domain: &Domain) -> Self {
+        Self { x: 0.0, y: 0.0, width: f64::from(domain.width), height: f64::from(domain.height) }
+    }
+
+    /// Checks that positions stay within the arithmetic of the fill at any surface size. The smallest side, 2^-12 px,
+    /// is finer than the positions themselves.
+    ///
+    /// # Errors
+    /// Not a number, too far out, too small or too large.
+    pub fn check(&self) -> Result<(), ViewportError> {
+        const LARGEST: f64 = (1 << 20) as f64;
+        const SMALLEST: f64 = 1.0 / (1 << 12) as f64;
+        let edges = [self.x, self.y].iter().all(|edge| edge.abs() <= LARGEST);
+        let sides = [self.width, self.height].iter().all(|side| (SMALLEST..=LARGEST).contains(side));
+        if edges && sides { Ok(()) } else { Err(ViewportError(*self)) }
+    }
+}
+
+/// The map from fine units to the grid of a surface, and the surface's size.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View {
+    scale: [f64; 2],
+    offset: [f64; 2],
+    /// Width of the surface in pixels.
+    pub(super) columns: i32,
+    /// Height of the surface in pixels.
+    pub(super) rows: i32,
+}
+
+impl View {
+    /// `viewport` of a slab on `domain`, stretched over `width` x `height` pixels.
+    pub(super) fn new(domain: &Domain, viewport: Viewport, (width, height): (u32, u32)) -> Self {
+        let fine = f64::from(domain.unit()) * f64::from(1 << FINE_BITS);
+        let grid = f64::from(1 << GRID_BITS);
+        let per_pixel = [f64::from(width) * grid / viewport.width, f64::from(height) * grid / viewport.height];
+        Self {
+            scale: per_pixel.map(|scale| scale / fine),
+            offset: [viewport.x * per_pixel[0], viewport.y * per_pixel[1]],
+            columns: width as i32,
+            rows: height as i32,
+        }
+    }
+
+    /// Where a point of the slice lies on the surface's grid.
+    #[inline]
+    pub(super) fn grid(&self, x: f64, y: f64) -> GridPoint {
+        // 2^40 px: beyond what a checked viewport makes of a picture's far corner, and far from overflow.
+        const LIMIT: f64 = (1u64 << 60) as f64;
+        let snap = |v: f64, axis: usize| (v * self.scale[axis] - self.offset[axis]).clamp(-LIMIT, LIMIT) as i64;
+        GridPoint { x: snap(x, 0), y: snap(y, 1) }
+    }
+}
+
+/// The plane at time `frame` (frames since the slab's first) in fine units: clamped to [half a lattice unit, the slab's
+/// duration], so that it always cuts tets.
+pub(super) fn plane(domain: &Domain, frame: f64) -> i32 {
+    let fine = 1 << FINE_BITS;
+    let (first, last) = (fine / 2, domain.extent().z * fine);
+    let t = frame * f64::from(domain.unit()) * f64::from(fine);
+    // NaN casts to 0.
+    (t.round() as i32).clamp(first, last)
+}

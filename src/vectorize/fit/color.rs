@@ -1,0 +1,79 @@
+//! Colour optimisation (§IV-C) against the frames themselves.
+//!
+//! In: a model at its positions, and what the frames say about its tets. Out: wedge colours with the least squared
+//! error, through the masks that the decoder will apply, by conjugate gradients. The paper samples the dense mesh's
+//! colours at the fine vertices; here every pixel of the frames counts, which is what will be looked at.
+
+use glam::Vec3;
+
+use super::model::Model;
+use super::moments::Moments;
+use super::normal::NormalEquations;
+use super::parallel;
+use super::sparse::conjugate_gradient;
+use super::{COLOR_RANGE, FitParams};
+
+/// Wedge colours while they are fitted.
+#[derive(Debug, Clone)]
+pub(super) struct Colors {
+    /// The colour of each wedge.
+    pub(super) now: Vec<Vec3>,
+    /// The colour that each wedge keeps where no pixel speaks for it.
+    pub(super) anchor: Vec<Vec3>,
+    /// 1 for wedges that may change, 0 for others.
+    pub(super) mask: Vec<Vec3>,
+}
+
+impl Colors {
+    /// Starts from colours that are also the anchors.
+    pub(super) fn new(now: Vec<Vec3>, free: &[bool]) -> Self {
+        let mask = free.iter().map(|&free| if free { Vec3::ONE } else { Vec3::ZERO }).collect();
+        Self { anchor: now.clone(), now, mask }
+    }
+
+    /// `iterations` steps of conjugate gradients towards the least squared error.
+    pub(super) fn optimize(&mut self, model: &Model, moments: &[Moments], iterations: u32, params: &FitParams) {
+        let damping = vec![params.color_anchor; self.now.len()];
+        let system = NormalEquations::of_colors(model, moments, self.mask.clone(), damping);
+        let nodes = model.node_colors(&self.now);
+        let rhs = system.right_hand_side(&nodes, |w| self.anchor[w] - self.now[w]);
+        let change = conjugate_gradient(&system, rhs, iterations, params.tolerance);
+        self.add(&change);
+    }
+
+    /// Adds a change per wedge, within the range that the stream can hold.
+    pub(super) fn add(&mut self, change: &[Vec3]) {
+        for ((now, change), mask) in self.now.iter_mut().zip(change).zip(&self.mask) {
+            if mask.x > 0.0 && change.is_finite() {
+                *now = clamp(*now + *change);
+            }
+        }
+    }
+
+    /// Rounds colours that may change to multiples of `step` sixteenths of a level.
+    pub(super) fn quantize(&mut self, step: u8) {
+        let step = f32::from(step) / 16.0;
+        let limit = COLOR_RANGE.map(|limit| (limit / step).trunc());
+        for (now, _) in self.now.iter_mut().zip(&self.mask).filter(|(_, mask)| mask.x > 0.0) {
+            *now = (*now / step).round().clamp(Vec3::splat(limit[0]), Vec3::splat(limit[1])) * step;
+        }
+    }
+}
+
+/// The squared error over all measured pixels and channels.
+pub(super) fn squared_error(model: &Model, moments: &[Moments], wedge_colors: &[Vec3]) -> f64 {
+    let nodes = model.node_colors(wedge_colors);
+    parallel::sum(moments.len(), |m| {
+        let tet = model.tets[moments[m].tet as usize];
+        moments[m].energy(tet.map(|n| nodes[n as usize]))
+    })
+}
+
+/// Number of pixels measured.
+pub(super) fn pixel_count(moments: &[Moments]) -> u64 {
+    moments.iter().map(|m| u64::from(m.pixels)).sum()
+}
+
+fn clamp(color: Vec3) -> Vec3 {
+    color.clamp(Vec3::splat(COLOR_RANGE[0]), Vec3::splat(COLOR_RANGE[1]))
+}

@@ -1,0 +1,235 @@
+//! The normal equations of a fit: how the squared error answers to wedge colours and vertex positions together.
+//!
+//! In: a model, its points and colours, and what the frames say about its tets. Out: the Gauss-Newton system, known
+//! by products only, and its right-hand side. Inside a tet with colour gradient C a displacement d of corner i
+//! changes a pixel's colour by -phi_i C d, and a change f of the corner's colour changes it by phi_i f; with
+//! u_i = f_i - C d_i both go through the same moments. A jump between labels adds no term: where a boundary lies is
+//! known only through the colours on its two sides.
+
+use std::ops::AddAssign;
+
+use glam::{IVec3, Mat3, Vec3};
+
+use super::model::Model;
+use super::moments::{Moments, color_gradient};
+use super::parallel;
+use super::sparse::System;
+
+/// Parts in which sums over tets are collected. Part of the result, so never derived from the machine.
+const PARTS: usize = 8;
+
+/// What keeps positions from running where the frames say little.
+#[derive(Debug, Clone)]
+pub(super) struct PositionDamping {
+    /// Per vertex: Marquardt's factor on the mean of the vertex's own diagonal.
+    pub(super) relative: Vec<f32>,
+    /// Squared levels times pixels that a displacement of one pixel costs, whatever the frames say.
+    pub(super) absolute: f32,
+}
+
+/// A fit linearised at a state of the model. Vectors hold one triple per wedge (change of colour) and, where positions
+/// move, one per vertex after these (displacement in pixels and frames).
+pub(super) struct NormalEquations<'a> {
+    model: &'a Model,
+    moments: &'a [Moments],
+    /// 1 for components that may change, 0 for others.
+    mask: Vec<Vec3>,
+    /// Added to the diagonal, per entry of a vector.
+    damping: Vec<f32>,
+    /// Inverse of the wedges' diagonal.
+    color_inverse: Vec<f32>,
+    /// Inverse of the vertices' diagonal blocks; empty where positions are held.
+    position_inverse: Vec<Mat3>,
+    /// Colour gradients of the tets of `moments`; empty where positions are held.
+    gradients: Vec<Mat3>,
+}
+
+impl<'a> NormalEquations<'a> {
+    /// Colours alone. `mask` and `damping` (in pixels) have an entry per wedge.
+    pub(super) fn of_colors(model: &'a Model, moments: &'a [Moments], mask: Vec<Vec3>, damping: Vec<f32>) -> Self {
+        let (position_inverse, gradients) = (Vec::new(), Vec::new());
+        let color_inverse = Vec::new();
+        let mut system = Self { model, moments, mask, damping, color_inverse, position_inverse, gradients };
+        system.color_inverse = system.invert_color_diagonal();
+        system
+    }
+
+    /// Colours and positions together. `mask` has an entry per wedge, then one per vertex.
+    pub(super) fn of_colors_and_positions(
+        (model, moments): (&'a Model, &'a [Moments]),
+        (points, node_colors): (&[IVec3], &[Vec3]),
+        mask: Vec<Vec3>,
+        color_damping: Vec<f32>,
+        position_damping: &PositionDamping,
+    ) -> Self {
+        let mut system = Self::of_colors(model, moments, mask, color_damping);
+        system.gradients = parallel::map(moments.len(), |m| {
+            let tet = moments[m].tet as usize;
+            let corners = model.tet_points(tet).map(|p| points[p]);
+            color_gradient(corners, model.tets[tet].map(|n| node_colors[n as usize]), model.fine_unit as f32)
+        });
+        system.damp_and_invert_positions(position_damping);
+        system
+    }
+
+    /// The right-hand side, for nodes of these colours: minus half the gradient of the squared error, and for wedge w
+    /// its damping times `pull(w)`, the way from its colour to the one it would have if no pixel spoke.
+    pub(super) fn right_hand_side(&self, node_colors: &[Vec3], pull: impl Fn(usize) -> Vec3) -> Vec<Vec3> {
+        let mut out = self.adjoint(|m| self.moments[m].residual(self.corner_values(m, node_colors)));
+        for (wedge, out) in out.iter_mut().enumerate().take(self.wedges()) {
+            *out += pull(wedge) * self.damping[wedge] * self.mask[wedge];
+        }
+        out
+    }
+
+    fn corner_values(&self, moment: usize, node_values: &[Vec3]) -> [Vec3; 4] {
+        self.model.tets[self.moments[moment].tet as usize].map(|n| node_values[n as usize])
+    }
+
+    fn wedges(&self) -> usize {
+        self.model.colors_back.rows()
+    }
+
+    /// Carries what `corner_change(m)` finds at the corners of each measured tet back to wedges and vertices.
+    fn adjoint(&self, corner_change: impl Fn(usize) -> [Vec3; 4] + Sync) -> Vec<Vec3> {
+        let (model, nodes) = (self.model, self.model.node_point.len());
+        let points = if self.gradients.is_empty() { 0 } else { model.positions.rows() };
+        let sums = collect(self.moments.len(), nodes + points, |m, out: &mut [Vec3]| {
+            let tet = self.moments[m].tet as usize;
+            let change = corner_change(m);
+            for (corner, &node) in model.tets[tet].iter().enumerate() {
+                out[node as usize] += change[corner];
+            }
+            if let Some(gradient) = self.gradients.get(m) {
+                let transposed = gradient.transpose();
+                for (corner, point) in model.tet_points(tet).into_iter().enumerate() {
+                    out[nodes + point] -= transposed * change[corner];
+                }
+            }
+        });
+        let mut out = model.colors_back.times(&sums[..nodes]);
+        if points > 0 {
+            out.extend(model.positions_back.times(&sums[nodes..]));
+        }
+        out.iter_mut().zip(&self.mask).for_each(|(out, mask)| *out *= *mask);
+        out
+    }
+
+    /// Approximates the diagonal by the tets' own diagonals through squared weights.
+    fn invert_color_diagonal(&self) -> Vec<f32> {
+        let nodes = collect(self.moments.len(), self.model.node_point.len(), |m, out: &mut [f32]| {
+            for (corner, &node) in self.model.tets[self.moments[m].tet as usize].iter().enumerate() {
+                out[node as usize] += self.moments[m].diagonal(corner);
+            }
+        });
+        let diagonal = |wedge: usize| self.model.colors_back.row(wedge).map(|(n, w)| w * w * nodes[n]).sum::<f32>();
+        parallel::map(self.wedges(), |wedge| 1.0 / (diagonal(wedge) + self.damping[wedge]).max(f32::MIN_POSITIVE))
+    }
+
+    fn damp_and_invert_positions(&mut self, damping: &PositionDamping) {
+        let (model, wedges) = (self.model, self.wedges());
+        let points = collect(self.moments.len(), model.positions.rows(), |m, out: &mut [Block]| {
+            let gradient = &self.gradients[m];
+            let block = Block::of(gradient);
+            for (corner, point) in model.tet_points(self.moments[m].tet as usize).into_iter().enumerate() {
+                out[point] += block.scaled(self.moments[m].diagonal(corner));
+            }
+        });
+        let rows = parallel::map(model.positions_back.rows(), |vertex| {
+            let mut block = Block::default();
+            model.positions_back.row(vertex).for_each(|(p, w)| block += points[p].scaled(w * w));
+            let damping = damping.absolute + damping.relative[vertex] * block.diagonal.element_sum() / 3.0;
+            (damping, block.inverse(damping, self.mask[wedges + vertex]))
+        });
+        self.damping.extend(rows.iter().map(|r| r.0));
+        self.position_inverse = rows.into_iter().map(|r| r.1).collect();
+    }
+}
+
+impl System for NormalEquations<'_> {
+    fn times(&self, x: &[Vec3]) -> Vec<Vec3> {
+        let (colors, positions) = x.split_at(self.wedges());
+        let nodes = self.model.colors.times(colors);
+        let points = if self.gradients.is_empty() { Vec::new() } else { self.model.positions.times(positions) };
+        let mut out = self.adjoint(|m| {
+            let mut u = self.corner_values(m, &nodes);
+            if let Some(gradient) = self.gradients.get(m) {
+                let corners = self.model.tet_points(self.moments[m].tet as usize);
+                u.iter_mut().zip(corners).for_each(|(u, p)| *u -= *gradient * points[p]);
+            }
+            self.moments[m].product(u)
+        });
+        out.iter_mut().zip(x).zip(&self.damping).for_each(|((out, x), d)| *out += *x * *d);
+        out
+    }
+
+    fn precondition(&self, r: &[Vec3]) -> Vec<Vec3> {
+        let (colors, positions) = r.split_at(self.wedges());
+        let mut out: Vec<Vec3> = colors.iter().zip(&self.color_inverse).map(|(r, d)| *r * *d).collect();
+        out.extend(positions.iter().zip(&self.position_inverse).map(|(r, inverse)| *inverse * *r));
+        out
+    }
+}
+
+/// A symmetric 3x3 matrix.
+#[derive(Debug, Clone, Copy, Default)]
+struct Block {
+    diagonal: Vec3,
+    /// xy, xt, yt.
+    off: Vec3,
+}
+
+impl Block {
+    /// C^T C.
+    fn of(c: &Mat3) -> Self {
+        let [x, y, t] = [c.x_axis, c.y_axis, c.z_axis];
+        Self { diagonal: Vec3::new(x.dot(x), y.dot(y), t.dot(t)), off: Vec3::new(x.dot(y), x.dot(t), y.dot(t)) }
+    }
+
+    fn scaled(self, s: f32) -> Self {
+        Self { diagonal: self.diagonal * s, off: self.off * s }
+    }
+
+    /// The inverse of this plus `damping` on the diagonal, in the components that `mask` leaves.
+    fn inverse(self, damping: f32, mask: Vec3) -> Mat3 {
+        let floor = f32::MIN_POSITIVE.sqrt();
+        let d = (self.diagonal + damping).max(Vec3::splat(floor)) * mask + (Vec3::ONE - mask);
+        let o = self.off * Vec3::new(mask.x * mask.y, mask.x * mask.z, mask.y * mask.z);
+        let full = Mat3::from_cols_array(&[d.x, o.x, o.y, o.x, d.y, o.z, o.y, o.z, d.z]);
+        let inverse = full.inverse();
+        // Rounding can leave a nearly singular block indefinite; its diagonal alone is always safe.
+        let safe = full.determinant() > 1e-4 * d.element_product() && inverse.is_finite();
+        if safe { inverse } else { Mat3::from_diagonal(d.recip()) }
+    }
+}
+
+impl AddAssign for Block {
+    fn add_assign(&mut self, other: Self) {
+        self.diagonal += other.diagonal;
+        self.off += other.off;
+    }
+}
+
+/// Sums that every item adds to: `add(item, sums)` for all items, in parts that are added up in order.
+fn collect<T>(items: usize, len: usize, add: impl Fn(usize, &mut [T]) + Sync + Send) -> Vec<T>
+where
+    T: Copy + Default + AddAssign + Send + Sync,
+{
+    let per_part = items.div_ceil(PARTS).max(1);
+    let mut parts = parallel::map(items.div_ceil(per_part), |part| {
+        let mut sums = vec![T::default(); len];
+        (part * per_part..((part + 1) * per_part).min(items)).for_each(|item| add(item, &mut sums));
+        sums
+    });
+    let Some((total, rest)) = parts.split_first_mut() else {
+        return vec![T::default(); len];
+    };
+    let first = std::mem::take(total);
+    let mut sums = vec![T::default(); len];
+    parallel::fill(&mut sums, |i| {
+        let mut sum = first[i];
+        rest.iter().for_each(|part| sum += part[i]);
+        sum
+    });
+    sums
+}

@@ -1,0 +1,130 @@
+//! Position optimisation: vertices go where the frames are shown best. (The paper moves boundaries only, §IV-B.)
+//!
+//! In: a patch, its model, the frames. Out: the patch's free vertices at better positions of the integer lattice, with
+//! the colours that go with them. Levenberg-Marquardt on colours and positions together: both are linear in the
+//! pixels' moments, so a step costs one look at the pixels and a few products. A step stands only if the squared
+//! error falls.
+
+use glam::Vec3;
+
+use super::FitParams;
+use super::color::{Colors, squared_error};
+use super::guard::Guard;
+use super::model::Model;
+use super::moments::{Moments, measure};
+use super::normal::{NormalEquations, PositionDamping};
+use super::patch::Patch;
+use super::sparse::conjugate_gradient;
+use crate::video::Volume;
+
+/// What the optimisation did.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Refined {
+    /// Steps that stood.
+    pub(super) steps: u32,
+    /// Moves that the guard refused, over all steps.
+    pub(super) refused: u32,
+}
+
+/// Marquardt's factor: where it starts, how a good and a bad step change it, and where it ends.
+const DAMPING_START: f32 = 0.1;
+const DAMPING_GOOD: f32 = 0.4;
+const DAMPING_BAD: f32 = 4.0;
+const DAMPING_RANGE: [f32; 2] = [1e-3, 1e3];
+
+/// Optimises positions and colours of `patch`; returns with the moments of the final positions.
+pub(super) fn optimize_positions(
+    patch: &mut Patch,
+    model: &Model,
+    colors: &mut Colors,
+    frames: &Volume,
+    params: &FitParams,
+) -> (Vec<Moments>, Refined) {
+    let guard = Guard::new(&patch.mesh, params.minimum_altitude);
+    let mut state = State::start(patch, model, colors.clone(), frames, params);
+    let mut damping = DAMPING_START;
+    let mut report = Refined::default();
+    for _ in 0..params.position_iterations {
+        let wish = state.step(patch, model, params, damping);
+        let before = patch.mesh.positions.clone();
+        report.refused += guard.move_all(&mut patch.mesh, &wish.steps);
+        let mut tried = State { colors: state.colors.clone(), moments: Vec::new(), error: 0.0 };
+        tried.colors.add(&wish.colors);
+        tried.look(patch, model, frames, params);
+        if tried.error < state.error {
+            let gain = (state.error - tried.error) / state.error;
+            state = tried;
+            report.steps += 1;
+            damping = (damping * DAMPING_GOOD).max(DAMPING_RANGE[0]);
+            if gain < params.tolerance {
+                break;
+            }
+        } else {
+            patch.mesh.positions = before;
+            damping *= DAMPING_BAD;
+            if damping > DAMPING_RANGE[1] {
+                break;
+            }
+        }
+    }
+    *colors = state.colors;
+    (state.moments, report)
+}
+
+/// A point of the search: colours, what the frames say at the patch's positions, and the error.
+struct State {
+    colors: Colors,
+    moments: Vec<Moments>,
+    error: f64,
+}
+
+/// A step that the linearised error asks for.
+struct Wish {
+    /// Change of each wedge's colour.
+    colors: Vec<Vec3>,
+    /// Displacement of each vertex, in lattice units.
+    steps: Vec<Vec3>,
+}
+
+impl State {
+    fn start(patch: &Patch, model: &Model, colors: Colors, frames: &Volume, params: &FitParams) -> Self {
+        let mut state = Self { colors, moments: Vec::new(), error: 0.0 };
+        state.look(patch, model, frames, params);
+        state
+    }
+
+    /// Measures at the patch's positions and lets the colours follow.
+    fn look(&mut self, patch: &Patch, model: &Model, frames: &Volume, params: &FitParams) {
+        let points = model.points(&patch.mesh.positions);
+        self.moments = measure(model, &points, &model.node_colors(&self.colors.now), frames);
+        self.colors.optimize(model, &self.moments, params.color_steps_between, params);
+        self.error = squared_error(model, &self.moments, &self.colors.now);
+    }
+
+    fn step(&self, patch: &Patch, model: &Model, params: &FitParams, damping: f32) -> Wish {
+        let mesh = &patch.mesh;
+        let points = model.points(&mesh.positions);
+        let nodes = model.node_colors(&self.colors.now);
+        // Vertices on label surfaces stay where the surface fit put them: pixels are sampled at their centres here, and
+        // a surface that follows blended edge pixels so becomes a saw (docs/benchmarks.md).
+        let movable = |v: usize| if patch.boundary[v] { Vec3::ZERO } else { patch.movable_components(v) };
+        let movable = (0..mesh.positions.len()).map(movable);
+        let mask = self.colors.mask.iter().copied().chain(movable).collect();
+        let damping =
+            PositionDamping { relative: vec![damping; mesh.positions.len()], absolute: params.position_stiffness };
+        let anchors = vec![params.color_anchor; self.colors.now.len()];
+        let system = NormalEquations::of_colors_and_positions(
+            (model, &self.moments),
+            (&points, &nodes),
+            mask,
+            anchors,
+            &damping,
+        );
+        let rhs = system.right_hand_side(&nodes, |w| self.colors.anchor[w] - self.colors.now[w]);
+        let mut colors = conjugate_gradient(&system, rhs, params.position_cg_iterations, params.tolerance);
+        let unit = mesh.domain.unit() as f32;
+        let steps = colors.split_off(self.colors.now.len());
+        let steps = steps.iter().map(|d| d.clamp_length_max(params.max_step_px) * unit).collect();
+        Wish { colors, steps }
+    }
+}

@@ -1,0 +1,460 @@
+//! The loop: pick the cheapest edge, check, collapse, until the goal is reached.
+
+use glam::{IVec3, Vec3};
+
+use super::SimplifyParams;
+use super::legality::{Limits, Refusal, RefusalCounts, Topology};
+use super::quadric::{PositionQuadric, WedgeQuadric};
+use super::queue::{BucketQueue, Entry};
+use super::work_mesh::{NONE, WorkMesh};
+
+/// Which part of the window may change, in lattice units of t: vertices at or before `low`, and at or after `high`,
+/// are frozen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unfrozen {
+    /// The trailing part that has been handed on.
+    pub low: i32,
+    /// The leading part that waits for its neighbours.
+    pub high: i32,
+}
+
+/// When to stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goal {
+    /// Vertices before `before` to be left. What lies between `before` and the frozen part is collapsed at the same
+    /// cost, but not counted: next to a dense frozen layer it cannot become as sparse.
+    pub vertices: usize,
+    /// Up to where `vertices` are counted, in lattice units of t.
+    pub before: i32,
+    /// Vertices before `Unfrozen::high` to be left: what bounds the window's memory.
+    pub vertices_in_window: usize,
+    /// Most that a collapse may cost: integrated squared colour error, in squared levels x cubic pixels.
+    pub max_cost: f32,
+    /// Most that the next collapse's cost times the number of `vertices` left may be: as costs are nearly equal
+    /// everywhere, this follows the squared error integrated over the part that is counted.
+    pub max_error: f32,
+}
+
+/// What a run did.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SimplifyReport {
+    /// Edges collapsed.
+    pub collapses: u64,
+    /// Costs computed.
+    pub evaluations: u64,
+    /// Refusals by name.
+    pub refusals: RefusalCounts,
+    /// The greatest cost that was paid.
+    pub max_cost: f32,
+    /// Vertices left before `Goal::before`.
+    pub vertices: usize,
+    /// Vertices left before `Unfrozen::high`.
+    pub vertices_in_window: usize,
+}
+
+/// Where an edge's merged vertex would go, and what it would cost.
+#[derive(Debug, Clone, Copy)]
+struct Proposal {
+    position: IVec3,
+    cost: f32,
+}
+
+/// Refusals of one edge before it is put aside until the queue is empty.
+const MOST_ATTEMPTS: u32 = 4;
+/// Buckets by which a refused edge is put back: half an octave of cost.
+const SETBACK: usize = 8;
+/// Log2 of the slots in the table of entries known to be queued already.
+const KNOWN_BITS: u32 = 18;
+
+struct Simplifier<'a, Q> {
+    mesh: &'a mut WorkMesh<Q>,
+    unfrozen: Unfrozen,
+    goal: Goal,
+    params: &'a SimplifyParams,
+    limits: Limits,
+    queue: BucketQueue,
+    aside: Vec<Entry>,
+    alias: Vec<u32>,
+    known: Vec<[u32; 3]>,
+    report: SimplifyReport,
+    star: Vec<u32>,
+}
+
+/// Collapses edges of `mesh` in the order of their cost until `goal` is reached or nothing more is allowed.
+pub fn simplify<Q: WedgeQuadric>(
+    mesh: &mut WorkMesh<Q>,
+    unfrozen: Unfrozen,
+    goal: Goal,
+    params: &SimplifyParams,
+) -> SimplifyReport {
+    let unit = i64::from(mesh.domain.unit());
+    let limits = Limits {
+        min_volume6: ((unit * unit * unit) as f32 * params.min_volume6) as i64,
+        min_shape: params.min_shape.powi(3),
+        max_extent: (params.max_extent_frames as i32).saturating_mul(mesh.domain.unit()),
+    };
+    let count = |before: i32| {
+        let live = (0..mesh.positions.len()).filter(|&v| mesh.stamps[v] != NONE);
+        live.filter(|&v| mesh.positions[v].z < before).count()
+    };
+    let report = SimplifyReport {
+        vertices: count(goal.before),
+        vertices_in_window: count(unfrozen.high),
+        ..SimplifyReport::default()
+    };
+    let mut run = Simplifier {
+        alias: (0..mesh.positions.len() as u32).collect(),
+        mesh,
+        unfrozen,
+        goal,
+        params,
+        limits,
+        queue: BucketQueue::new(),
+        aside: Vec::new(),
+        known: vec![[NONE; 3]; 1 << KNOWN_BITS],
+        report,
+        star: Vec::new(),
+    };
+    run.rank_edges();
+    run.collapse();
+    run.report
+}
+
+impl<Q: WedgeQuadric> Simplifier<'_, Q> {
+    /// Fills the queue with every edge that has an end which may move.
+    fn rank_edges(&mut self) {
+        const CHUNK: usize = 4096;
+        let vertices = self.mesh.positions.len();
+        let chunks: Vec<std::ops::Range<usize>> =
+            (0..vertices).step_by(CHUNK).map(|start| start..(start + CHUNK).min(vertices)).collect();
+        // In groups, so that the ranked edges of a group, not of the whole mesh, wait beside the queue.
+        for group in chunks.chunks(32) {
+            for (ranked, evaluations, refusals) in self.rank_chunks(group) {
+                self.report.evaluations += evaluations;
+                self.report.refusals.add(&refusals);
+                for (bucket, entry) in ranked {
+                    self.queue.push(bucket, entry);
+                }
+            }
+        }
+    }
+
+    #[cfg(feature = "threads")]
+    fn rank_chunks(&self, group: &[std::ops::Range<usize>]) -> Vec<Ranked> {
+        use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
+        group.par_iter().map(|range| self.rank_range(range.clone())).collect()
+    }
+
+    #[cfg(not(feature = "threads"))]
+    fn rank_chunks(&self, group: &[std::ops::Range<usize>]) -> Vec<Ranked> {
+        group.iter().map(|range| self.rank_range(range.clone())).collect()
+    }
+
+    fn rank_range(&self, range: std::ops::Range<usize>) -> Ranked {
+        let (mut ranked, mut evaluations, mut refusals) = (Vec::new(), 0, RefusalCounts::default());
+        let mut neighbors = Vec::new();
+        for u in range.map(|u| u as u32) {
+            neighbors.clear();
+            let star = self.mesh.stars.star(u);
+            neighbors.extend(star.iter().flat_map(|&t| self.mesh.tets[t as usize]).filter(|&v| v > u));
+            neighbors.sort_unstable();
+            neighbors.dedup();
+            for &v in &neighbors {
+                if self.is_frozen(u) && self.is_frozen(v) {
+                    continue;
+                }
+                evaluations += 1;
+                match self.propose(u, v) {
+                    Ok(proposal) => {
+                        let stamp = self.mesh.stamps[u as usize].wrapping_add(self.mesh.stamps[v as usize]);
+                        ranked.push((BucketQueue::bucket(proposal.cost), Entry { u, v, stamp, attempts: 0 }));
+                    }
+                    Err(refusal) => refusals.note(refusal),
+                }
+            }
+        }
+        (ranked, evaluations, refusals)
+    }
+
+    fn is_done(&self) -> bool {
+        self.report.vertices <= self.goal.vertices && self.report.vertices_in_window <= self.goal.vertices_in_window
+    }
+
+    fn collapse(&mut self) {
+        let limit = BucketQueue::bucket(self.goal.max_cost);
+        let mut collapses_before = u64::MAX;
+        while !self.is_done() {
+            let Some((bucket, entry)) = self.queue.pop() else {
+                // What was refused may have become possible, as long as something changed since.
+                if self.aside.is_empty() || self.report.collapses == collapses_before {
+                    return;
+                }
+                collapses_before = self.report.collapses;
+                for entry in std::mem::take(&mut self.aside) {
+                    self.queue.push(0, Entry { stamp: NONE, attempts: 0, ..entry });
+                }
+                continue;
+            };
+            let error = BucketQueue::cost(bucket) * self.report.vertices as f32;
+            if bucket > limit || error > self.goal.max_error {
+                return;
+            }
+            if let Some(entry) = self.renew(bucket, entry) {
+                self.try_collapse(bucket, entry);
+            }
+        }
+    }
+
+    /// The entry, if its cost is current and its turn has come; an outdated one is renewed and put back.
+    fn renew(&mut self, bucket: usize, entry: Entry) -> Option<Entry> {
+        let (u, v) = (self.root(entry.u), self.root(entry.v));
+        if u == v {
+            return None;
+        }
+        let stamp = self.mesh.stamps[u as usize].wrapping_add(self.mesh.stamps[v as usize]);
+        if [u, v, stamp] == [entry.u, entry.v, entry.stamp] {
+            return Some(entry);
+        }
+        let (u, v) = (u.min(v), u.max(v));
+        let slot = (u.wrapping_mul(0x9e37_79b1) ^ v.wrapping_mul(0x85eb_ca6b)) >> (32 - KNOWN_BITS);
+        if self.known[slot as usize] == [u, v, stamp] {
+            return None;
+        }
+        self.known[slot as usize] = [u, v, stamp];
+        self.report.evaluations += 1;
+        match self.propose(u, v) {
+            Ok(proposal) => {
+                let renewed = Entry { u, v, stamp, attempts: 0 };
+                let due = BucketQueue::bucket(proposal.cost);
+                if due <= bucket {
+                    return Some(renewed);
+                }
+                self.queue.push(due, renewed);
+            }
+            Err(refusal) => self.report.refusals.note(refusal),
+        }
+        None
+    }
+
+    fn try_collapse(&mut self, bucket: usize, entry: Entry) {
+        let (u, v) = (entry.u, entry.v);
+        let checked = self.propose(u, v).and_then(|proposal| {
+            if self.params.topology == Topology::Strict {
+                self.mesh.check_link(u, v)?;
+            }
+            self.mesh.check_geometry([u, v], proposal.position, &self.limits)?;
+            Ok(proposal)
+        });
+        match checked {
+            Ok(proposal) => self.perform(u, v, proposal),
+            Err(refusal) => {
+                self.report.refusals.note(refusal);
+                let entry = Entry { attempts: entry.attempts + 1, ..entry };
+                if entry.attempts < MOST_ATTEMPTS {
+                    self.queue.push((bucket + SETBACK).min(BucketQueue::bucket(f32::MAX)), entry);
+                } else {
+                    self.aside.push(entry);
+                }
+            }
+        }
+    }
+
+    fn root(&mut self, mut v: u32) -> u32 {
+        while self.alias[v as usize] != v {
+            let parent = self.alias[v as usize];
+            self.alias[v as usize] = self.alias[parent as usize];
+            v = parent;
+        }
+        v
+    }
+
+    fn is_frozen(&self, v: u32) -> bool {
+        let t = self.mesh.positions[v as usize].z;
+        t <= self.unfrozen.low || t >= self.unfrozen.high
+    }
+
+    /// Position and cost of merging `u` and `v`; costs nothing but arithmetic on the two.
+    fn propose(&self, u: u32, v: u32) -> Result<Proposal, Refusal> {
+        let mesh = &*self.mesh;
+        let (fixed_u, fixed_v) = (self.is_frozen(u), self.is_frozen(v));
+        if fixed_u && fixed_v {
+            return Err(Refusal::Frozen);
+        }
+        let (sides_u, sides_v) = (mesh.sides[u as usize], mesh.sides[v as usize]);
+        let sides = sides_u.or(sides_v);
+        if sides != sides_u && sides != sides_v {
+            return Err(Refusal::Sides);
+        }
+        // The frozen end, else the one of higher category, keeps its place in the axes in which it is bound.
+        let bound = if fixed_u || (!fixed_v && sides_u == sides) { u } else { v };
+        if mesh.sides[bound as usize] != sides {
+            return Err(Refusal::Sides);
+        }
+        if self.params.topology == Topology::Strict {
+            mesh.check_labels(u, v)?;
+        }
+        let total = self.merged_quadric(u, v, bound);
+        let origin = mesh.positions[bound as usize];
+        if fixed_u || fixed_v || self.keeps_place(u, v, bound) {
+            return Ok(Proposal { position: origin, cost: total.at(Vec3::ZERO) });
+        }
+        let axis = |low: u8, high: u8| (sides.0 & (low | high) != 0).then_some(0.0);
+        let fixed = [axis(1, 2), axis(4, 8), axis(16, 32)];
+        Ok(self.best_position(&total, [u, v], origin, fixed))
+    }
+
+    /// Under strict topology the vertex of higher class stays where it is.
+    fn keeps_place(&self, u: u32, v: u32, bound: u32) -> bool {
+        let other = if bound == u { v } else { u };
+        self.params.topology == Topology::Strict && self.mesh.wedges(bound).count() > self.mesh.wedges(other).count()
+    }
+
+    /// The quadric of the merged vertex, about the position of `origin` (one of the two).
+    fn merged_quadric(&self, u: u32, v: u32, origin: u32) -> PositionQuadric {
+        let mesh = &*self.mesh;
+        let other = if origin == u { v } else { u };
+        let shift = mesh.offset(mesh.positions[other as usize], mesh.positions[origin as usize]);
+        let mut total = PositionQuadric::default();
+        for wedge in mesh.wedges(origin) {
+            let mut quadric = wedge.quadric;
+            if let Some(twin) = mesh.wedge(other, wedge.label) {
+                quadric.add(&twin.quadric.recentered(shift));
+            }
+            total.add_scaled(&quadric.reduced(), 1.0);
+        }
+        for wedge in mesh.wedges(other).filter(|wedge| mesh.wedge(origin, wedge.label).is_none()) {
+            total.add_scaled(&wedge.quadric.recentered(shift).reduced(), 1.0);
+        }
+        if let Some(surface) = mesh.surfaces.get(mesh.surface[origin as usize] as usize) {
+            total.add_scaled(surface, 1.0);
+        }
+        if let Some(surface) = mesh.surfaces.get(mesh.surface[other as usize] as usize) {
+            total.add_scaled(&surface.recentered(shift), 1.0);
+        }
+        let mut inherited = mesh.inherited[origin as usize];
+        inherited.add(&mesh.inherited[other as usize].recentered(shift));
+        let spread = PositionQuadric::points(inherited.count, inherited.sum, inherited.squares);
+        total.add_scaled(&spread, self.params.spread_weight);
+        total
+    }
+
+    /// The lattice point that costs least among the minimiser's, the ends' and the middle's; the minimiser is trusted
+    /// only near the edge.
+    fn best_position(
+        &self,
+        total: &PositionQuadric,
+        ends: [u32; 2],
+        origin: IVec3,
+        fixed: [Option<f32>; 3],
+    ) -> Proposal {
+        let mesh = &*self.mesh;
+        let unit = mesh.domain.unit() as f32;
+        let [a, b] = ends.map(|v| mesh.positions[v as usize]);
+        let at = |position: IVec3| Proposal { position, cost: total.at(mesh.offset(origin, position)) };
+        let middle = mesh.offset(origin, a).midpoint(mesh.offset(origin, b));
+        let reach = 2.0 * mesh.offset(a, b).length();
+        if let Some(x) = total.minimizer(fixed).filter(|x| x.distance(middle) <= reach) {
+            return at(origin + (x * unit).round().as_ivec3());
+        }
+        let mut middle = (a + b) / 2;
+        for axis in 0..3 {
+            if fixed[axis].is_some() {
+                middle[axis] = origin[axis];
+            }
+        }
+        let bound_to = |p: IVec3| (0..3).all(|axis| fixed[axis].is_none() || p[axis] == origin[axis]);
+        let mut best = at(middle);
+        for proposal in [a, b].into_iter().filter(|&p| bound_to(p)).map(at) {
+            if proposal.cost < best.cost {
+                best = proposal;
+            }
+        }
+        best
+    }
+
+    /// Merges the two ends. A frozen or committed end keeps its number, else the one with the larger star.
+    fn perform(&mut self, u: u32, v: u32, proposal: Proposal) {
+        let handed_on = |w: u32| self.mesh.committed[w as usize] != NONE || self.is_frozen(w);
+        let larger = self.mesh.stars.star(u).len() >= self.mesh.stars.star(v).len();
+        let keep_u = if handed_on(u) != handed_on(v) { handed_on(u) } else { larger };
+        let (kept, gone) = if keep_u { (u, v) } else { (v, u) };
+        self.report.collapses += 1;
+        self.report.max_cost = self.report.max_cost.max(proposal.cost);
+        let times = [gone, kept].map(|w| self.mesh.positions[w as usize].z);
+        let count = |vertices: usize, end: i32| {
+            let in_both = times.iter().filter(|&&t| t < end).count();
+            vertices + usize::from(proposal.position.z < end) - in_both
+        };
+        self.report.vertices = count(self.report.vertices, self.goal.before);
+        self.report.vertices_in_window = count(self.report.vertices_in_window, self.unfrozen.high);
+        self.mesh.merge_attributes(kept, gone, proposal.position);
+        self.mesh.merge_stars(kept, gone, &mut self.star);
+        self.alias[gone as usize] = kept;
+    }
+}
+
+type Ranked = (Vec<(usize, Entry)>, u64, RefusalCounts);
+
+impl<Q: WedgeQuadric> WorkMesh<Q> {
+    /// Moves `kept` to `position` and gives it the wedges and quadrics of `gone`.
+    fn merge_attributes(&mut self, kept: u32, gone: u32, position: IVec3) {
+        let (k, g) = (kept as usize, gone as usize);
+        let to_kept = self.offset(self.positions[k], position);
+        let to_gone = self.offset(self.positions[g], position);
+        let mut at = kept;
+        let mut wedge = Some(&mut self.first[at as usize]);
+        while let Some(own) = wedge {
+            own.quadric = own.quadric.recentered(to_kept);
+            at = own.next;
+            wedge = self.overflow.get_mut(at as usize);
+        }
+        let mut other = Some(self.first[g]);
+        while let Some(wedge) = other {
+            other = self.overflow.get(wedge.next as usize).copied();
+            self.wedge_mut(kept, wedge.label).quadric.add(&wedge.quadric.recentered(to_gone));
+        }
+        let mut inherited = self.inherited[k].recentered(to_kept);
+        inherited.add(&self.inherited[g].recentered(to_gone));
+        self.inherited[k] = inherited;
+        self.merge_surfaces(k, g, to_kept, to_gone);
+        self.positions[k] = position;
+        self.sides[k] = self.sides[k].or(self.sides[g]);
+        self.stamps[k] += 1;
+        self.stamps[g] = NONE;
+    }
+
+    fn merge_surfaces(&mut self, k: usize, g: usize, to_kept: Vec3, to_gone: Vec3) {
+        let of_gone = self.surfaces.get(self.surface[g] as usize).map(|s| s.recentered(to_gone));
+        if let Some(own) = self.surfaces.get_mut(self.surface[k] as usize) {
+            *own = own.recentered(to_kept);
+            if let Some(other) = of_gone {
+                own.add_scaled(&other, 1.0);
+            }
+        } else if let Some(other) = of_gone {
+            self.surface[k] = self.surface[g];
+            self.surfaces[self.surface[g] as usize] = other;
+        }
+    }
+
+    /// Lets the tets between the two vanish and hands the others of `gone` to `kept`; `star` is scratch.
+    fn merge_stars(&mut self, kept: u32, gone: u32, star: &mut Vec<u32>) {
+        star.clear();
+        star.extend_from_slice(self.stars.star(kept));
+        let own = star.len();
+        star.extend_from_slice(self.stars.star(gone));
+        for &tet in &star[own..] {
+            let corners = self.tets[tet as usize];
+            if corners.contains(&kept) {
+                self.tets[tet as usize] = [NONE; 4];
+                for w in corners.into_iter().filter(|&w| w != kept && w != gone) {
+                    self.stars.remove(w, tet);
+                }
+            } else {
+                self.tets[tet as usize] = corners.map(|w| if w == gone { kept } else { w });
+            }
+        }
+        // A tet that vanished stood in both stars; one that lives stands in one.
+        star.retain(|&tet| self.tets[tet as usize][0] != NONE);
+        self.stars.merge(kept, gone, star);
+    }
+}

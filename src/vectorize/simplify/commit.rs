@@ -1,0 +1,98 @@
+//! Handing on: tets that can no longer change move from the working mesh to the slab's committed mesh.
+
+use glam::Vec3;
+
+use super::quadric::WedgeQuadric;
+use super::stars::Stars;
+use super::work_mesh::{NONE, WorkMesh};
+use crate::mesh::{TetMesh, VertexId, Wedge, WedgeId};
+
+impl<Q: WedgeQuadric> WorkMesh<Q> {
+    /// Moves every tet whose vertices all lie at or before `low` (lattice units of t) to the end of `committed`, and
+    /// packs what is left. Ids in `committed` stay as they are; a vertex or wedge gets one with its first tet.
+    pub fn commit(&mut self, low: i32, committed: &mut TetMesh) {
+        let tets = std::mem::take(&mut self.tets);
+        let labels = std::mem::take(&mut self.labels);
+        for (tet, label) in tets.into_iter().zip(labels) {
+            if tet[0] == NONE {
+                continue;
+            }
+            if tet.iter().all(|&v| self.positions[v as usize].z <= low) {
+                let corners = tet.map(|v| self.commit_wedge(v, label, committed));
+                committed.tets.push(corners);
+            } else {
+                self.tets.push(tet);
+                self.labels.push(label);
+            }
+        }
+        self.pack();
+    }
+
+    fn commit_wedge(&mut self, v: u32, label: crate::video::Label, committed: &mut TetMesh) -> WedgeId {
+        if self.committed[v as usize] == NONE {
+            self.committed[v as usize] = committed.push_vertex(self.positions[v as usize]).0;
+        }
+        let vertex = VertexId(self.committed[v as usize]);
+        let wedge = self.wedge_mut(v, label);
+        if wedge.committed == NONE {
+            let color = wedge.quadric.color_at(Vec3::ZERO);
+            wedge.committed = committed.push_wedge(Wedge { vertex, label, color }).0;
+        }
+        WedgeId(wedge.committed)
+    }
+
+    /// Drops vertices without tets and renumbers the others in their order.
+    fn pack(&mut self) {
+        let mut number = vec![NONE; self.positions.len()];
+        for &v in self.tets.as_flattened() {
+            number[v as usize] = 0;
+        }
+        for (kept, slot) in (0..).zip(number.iter_mut().filter(|slot| **slot != NONE)) {
+            *slot = kept;
+        }
+        for v in self.tets.as_flattened_mut() {
+            *v = number[*v as usize];
+        }
+        self.pack_overflow(&number);
+        retain_numbered(&mut self.positions, &number);
+        retain_numbered(&mut self.sides, &number);
+        retain_numbered(&mut self.stamps, &number);
+        retain_numbered(&mut self.committed, &number);
+        retain_numbered(&mut self.inherited, &number);
+        retain_numbered(&mut self.surface, &number);
+        retain_numbered(&mut self.first, &number);
+        self.stars = Stars::new(self.positions.len(), &self.tets);
+    }
+
+    fn pack_overflow(&mut self, number: &[u32]) {
+        let old_overflow = std::mem::take(&mut self.overflow);
+        let old_surfaces = std::mem::take(&mut self.surfaces);
+        for v in (0..number.len()).filter(|&v| number[v] != NONE) {
+            let mut next = self.first[v].next;
+            self.first[v].next = NONE;
+            let mut tail = NONE;
+            while next != NONE {
+                let wedge = old_overflow[next as usize];
+                next = wedge.next;
+                let at = self.overflow.len() as u32;
+                self.overflow.push(super::work_mesh::WorkWedge { next: NONE, ..wedge });
+                let link = if tail == NONE { &mut self.first[v].next } else { &mut self.overflow[tail as usize].next };
+                *link = at;
+                tail = at;
+            }
+            if let Some(&surface) = old_surfaces.get(self.surface[v] as usize) {
+                self.surface[v] = self.surfaces.len() as u32;
+                self.surfaces.push(surface);
+            }
+        }
+    }
+}
+
+fn retain_numbered<T>(items: &mut Vec<T>, number: &[u32]) {
+    let mut v = 0;
+    items.retain(|_| {
+        v += 1;
+        number[v - 1] != NONE
+    });
+    items.shrink_to_fit();
+}

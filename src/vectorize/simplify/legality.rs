@@ -1,0 +1,176 @@
+//! Which collapses are allowed, and under what name the others are refused.
+
+use glam::IVec3;
+
+use super::quadric::WedgeQuadric;
+use super::work_mesh::WorkMesh;
+use crate::mesh::volume6;
+
+/// Why a collapse was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// Both ends lie in the frozen part of the window (§VI).
+    Frozen,
+    /// The ends lie on different sides of the box, so that merging them would bend the box.
+    Sides,
+    /// Strict topology: the ends' labels are such that merging would pinch or join label surfaces.
+    Labels,
+    /// Strict topology: the ends share a neighbour without sharing the face between (link condition).
+    Link,
+    /// A tet would turn over or become too small to survive rounding.
+    Flip,
+    /// A tet would become a sliver, which subdivision's smoothing would fold over.
+    Sliver,
+    /// A tet would reach over more frames than the window allows.
+    Extent,
+}
+
+impl Refusal {
+    /// All refusals, in the order of [`RefusalCounts`].
+    pub const ALL: [Self; 7] =
+        [Self::Frozen, Self::Sides, Self::Labels, Self::Link, Self::Flip, Self::Sliver, Self::Extent];
+}
+
+/// How often each [`Refusal`] occurred.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RefusalCounts([u64; 7]);
+
+impl RefusalCounts {
+    pub(super) fn note(&mut self, refusal: Refusal) {
+        self.0[refusal as usize] += 1;
+    }
+
+    /// Times `refusal` occurred.
+    pub fn count(&self, refusal: Refusal) -> u64 {
+        self.0[refusal as usize]
+    }
+
+    /// Adds another run's counts.
+    pub fn add(&mut self, other: &Self) {
+        for (a, b) in self.0.iter_mut().zip(other.0) {
+            *a += b;
+        }
+    }
+}
+
+/// How strictly labels' topology is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Topology {
+    /// Labels may merge and pinch as long as the tets stay positive, and so tile the volume: reaches lower ratios at
+    /// better quality.
+    #[default]
+    Free,
+    /// A vertex merges only into one whose labels include its own, along an edge of the surface they share, and under
+    /// the link condition; the merged vertex stays where the one of higher category was (§IV-A3).
+    Strict,
+}
+
+fn volume6_of([a, b, c, d]: [IVec3; 4]) -> i64 {
+    volume6(a, b, c, d)
+}
+
+/// The cube of a tet's mean ratio, 12 (3 V)^(2/3) over the sum of its squared edges: 1 for a regular tet, 0 for a flat
+/// one. Liu and Joe, "Relationship between tetrahedron shape measures", 1994.
+fn shape([a, b, c, d]: [IVec3; 4], volume6: i64) -> f32 {
+    let squared = |p: IVec3, q: IVec3| (q - p).as_vec3().length_squared();
+    let edges = squared(a, b) + squared(a, c) + squared(a, d) + squared(b, c) + squared(b, d) + squared(c, d);
+    // (12 / edges)^3 (V6 / 2)^2
+    432.0 * (volume6 as f32 / edges).powi(2) / edges
+}
+
+/// What a merged vertex must respect.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits {
+    /// Least six-fold volume of a tet, in cubic lattice units.
+    pub(super) min_volume6: i64,
+    /// Least cube of the mean ratio of a tet.
+    pub(super) min_shape: f32,
+    /// Most lattice units that a tet may reach through time.
+    pub(super) max_extent: i32,
+}
+
+impl<Q: WedgeQuadric> WorkMesh<Q> {
+    /// Whether the tets around `u` and `v` stay positive when both move to `position`, those between them vanishing.
+    ///
+    /// Positivity suffices for a tiling: the sum of signed volumes is kept, so positive tets cover each point once.
+    pub(super) fn check_geometry(&self, [u, v]: [u32; 2], position: IVec3, limits: &Limits) -> Result<(), Refusal> {
+        for (moved, other) in [(u, v), (v, u)] {
+            if self.positions[moved as usize] == position {
+                // Only tets that move can turn over, but a vertex that stays can still gain long ones from `other`.
+                continue;
+            }
+            for &tet in self.stars.star(moved) {
+                let corners = self.tets[tet as usize];
+                if corners.contains(&other) {
+                    continue;
+                }
+                let moved_corners = corners.map(|w| if w == moved { position } else { self.positions[w as usize] });
+                let volume = volume6_of(moved_corners);
+                if volume <= 0 {
+                    return Err(Refusal::Flip);
+                }
+                let shape = shape(moved_corners, volume);
+                if volume < limits.min_volume6 || shape < limits.min_shape {
+                    // A tet that was worse before is no reason to refuse what makes it better.
+                    let now = corners.map(|w| self.positions[w as usize]);
+                    let volume_now = volume6_of(now);
+                    if volume < limits.min_volume6 && volume < volume_now {
+                        return Err(Refusal::Flip);
+                    }
+                    if shape < limits.min_shape && shape < self::shape(now, volume_now) {
+                        return Err(Refusal::Sliver);
+                    }
+                }
+                let reaches =
+                    |&w: &u32| w != moved && (self.positions[w as usize].z - position.z).abs() > limits.max_extent;
+                if corners.iter().any(reaches) {
+                    return Err(Refusal::Extent);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The label rule of [`Topology::Strict`]: one end's labels and sides include the other's, and an edge between two
+    /// boundary vertices runs along the boundary.
+    pub(super) fn check_labels(&self, u: u32, v: u32) -> Result<(), Refusal> {
+        let includes = |a: u32, b: u32| {
+            self.sides[a as usize].contains(self.sides[b as usize])
+                && self.wedges(b).all(|wedge| self.wedge(a, wedge.label).is_some())
+        };
+        let class = |v: u32| self.wedges(v).count() as u32 + self.sides[v as usize].count();
+        let (lower, upper) = if class(u) <= class(v) { (u, v) } else { (v, u) };
+        if !includes(upper, lower) {
+            return Err(Refusal::Labels);
+        }
+        let around = self.labels_around(u, v);
+        if self.wedges(lower).all(|wedge| around.contains(&wedge.label)) { Ok(()) } else { Err(Refusal::Labels) }
+    }
+
+    fn labels_around(&self, u: u32, v: u32) -> Vec<crate::video::Label> {
+        let shared = self.stars.star(u).iter().filter(|&&t| self.tets[t as usize].contains(&v));
+        shared.map(|&t| self.labels[t as usize]).collect()
+    }
+
+    /// The link condition: a vertex next to both ends must share a tet with them. Dey, Edelsbrunner, Guha, Nekhayev,
+    /// "Topology preserving edge contraction", 1999.
+    pub(super) fn check_link(&self, u: u32, v: u32) -> Result<(), Refusal> {
+        let neighbors = |w: u32| {
+            let mut list: Vec<u32> =
+                self.stars.star(w).iter().flat_map(|&t| self.tets[t as usize]).filter(|&x| x != w).collect();
+            list.sort_unstable();
+            list.dedup();
+            list
+        };
+        let of_v = neighbors(v);
+        let shared: Vec<[u32; 4]> =
+            self.stars.star(u).iter().map(|&t| self.tets[t as usize]).filter(|tet| tet.contains(&v)).collect();
+        let common = neighbors(u).into_iter().filter(|w| *w != v && of_v.binary_search(w).is_ok());
+        for w in common {
+            if !shared.iter().any(|tet| tet.contains(&w)) {
+                return Err(Refusal::Link);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,49 @@
+//! Simplification of the window's mesh by edge collapse (§IV-A): extended quadric error metrics with a uniformity
+//! term, one colour per label at boundary vertices, categories of vertices, named refusals.
+//!
+//! In: runs of dense lattice ([`WorkMesh::append`]). Out: a sparse mesh that tiles the same box
+//! ([`WorkMesh::commit`]). Forbidden here: pixels, coding, deciding how long the window is.
+
+mod collapse;
+mod commit;
+mod legality;
+mod quadric;
+mod queue;
+mod stars;
+mod work_mesh;
+
+pub use collapse::{Goal, SimplifyReport, Unfrozen, simplify};
+pub use legality::{Refusal, RefusalCounts, Topology};
+pub use quadric::{ColorQuadric, DistanceQuadric, PositionQuadric, TetField, WedgeQuadric};
+pub use work_mesh::WorkMesh;
+
+/// Settings of [`simplify`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SimplifyParams {
+    /// Eta of Eq. 5 and 6: weight of the squared distance (pixels) to the lattice vertices inherited, against squared
+    /// colour levels. Flat between 0.03 and 3 (docs/benchmarks.md).
+    pub spread_weight: f32,
+    /// Weight of the squared distance (pixels) to the label surfaces inherited, per square pixel of surface.
+    pub surface_weight: f32,
+    /// Least six-fold volume of a tet, in cubic pixels; a tet of the unit lattice has 1.
+    pub min_volume6: f32,
+    /// Least mean ratio of a tet, between 0 (flat) and 1 (regular).
+    pub min_shape: f32,
+    /// Most frames that a tet may reach through: bounds how long a packet can wait for its tets.
+    pub max_extent_frames: u32,
+    /// How strictly the topology of labels is kept.
+    pub topology: Topology,
+}
+
+impl Default for SimplifyParams {
+    fn default() -> Self {
+        Self {
+            spread_weight: 0.3,
+            surface_weight: 30.0,
+            min_volume6: 1.0 / 16.0,
+            min_shape: 0.03,
+            max_extent_frames: 10,
+            topology: Topology::Free,
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! Labels: which region (temporal superpixel, or a merger of several) a pixel or a tet belongs to.
+
+/// A region of the video that persists through time within a slab. Colour may jump only between labels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct Label(pub u32);
+
+/// A label for every pixel of one frame, row-major.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LabelPlane {
+    width: u32,
+    height: u32,
+    labels: Vec<Label>,
+}
+
+impl LabelPlane {
+    /// Wraps `labels`, row-major; panics unless there are `width * height` of them.
+    pub fn new(width: u32, height: u32, labels: Vec<Label>) -> Self {
+        assert_eq!(labels.len(), width as usize * height as usize, "one label a pixel");
+        Self { width, height, labels }
+    }
+
+    /// A plane of one label.
+    pub fn uniform(width: u32, height: u32, label: Label) -> Self {
+        Self::new(width, height, vec![label; width as usize * height as usize])
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// All labels, row-major.
+    pub fn labels(&self) -> &[Label] {
+        &self.labels
+    }
+
+    /// The label of pixel (x, y).
+    pub fn label(&self, x: u32, y: u32) -> Label {
+        self.labels[y as usize * self.width as usize + x as usize]
+    }
+}

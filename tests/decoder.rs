@@ -1,0 +1,136 @@
+//! The decoder's door: packets in, pictures out.
+
+#![cfg(feature = "encode")]
+
+#[path = "bitstream/meshes.rs"]
+mod meshes;
+
+use meshes::{MeshParams, irregular_mesh};
+use tetvec::bitstream::{Fraction, SequenceHeader, SlabWriter};
+use tetvec::mesh::{Domain, TetMesh};
+use tetvec::{
+    DecodeError, Decoder, DecoderConfig, Packet, PixelFormat, Plane, SequenceHeader as Header, Surface, Viewport,
+    YuvMatrix,
+};
+
+const SIZE: (u32, u32) = (97, 71);
+const FRAMES: u32 = 9;
+
+fn slab(first_frame: u64, seed: u64) -> (Vec<Packet>, TetMesh) {
+    let domain = Domain { width: 64, height: 48, duration: 8, subpixel_bits: 3 };
+    let mesh = irregular_mesh(&MeshParams { domain, cells: [6, 5, 6], labels: 4, thinning: 50, seed });
+    let header = SequenceHeader {
+        width: domain.width,
+        height: domain.height,
+        frame_rate: Fraction { numerator: 25, denominator: 1 },
+        pixel_aspect_ratio: Fraction { numerator: 1, denominator: 1 },
+        subpixel_bits: domain.subpixel_bits,
+        subdivision_levels: 1,
+        color_step: 16,
+    };
+    let mut writer = SlabWriter::try_new(header, first_frame).expect("a header in range");
+    let packets = (0..FRAMES).map(|k| writer.write_packet(&mesh, k + 1 == FRAMES).expect("a tiling")).collect();
+    let coded = writer.coded_mesh().expect("a written mesh").clone();
+    (packets, coded)
+}
+
+fn picture(decoder: &mut Decoder, frame: f64) -> Result<Vec<u8>, DecodeError> {
+    let mut data = vec![0; 3 * (SIZE.0 * SIZE.1) as usize];
+    let planes = vec![Plane { data: &mut data, stride: 3 * SIZE.0 as usize }];
+    let mut surface = Surface::try_new(PixelFormat::Rgb, YuvMatrix::Bt601, SIZE, planes).expect("a surface");
+    decoder.render(frame, None, &mut surface)?;
+    Ok(data)
+}
+
+fn decoder(levels: u8) -> Decoder {
+    Decoder::new(DecoderConfig { subdivision_levels: Some(levels), threads: 0 })
+}
+
+/// What is drawn right after frame k's packet is what is drawn when all packets have come: packets bring all that a
+/// picture needs, at every level, and refining early does no harm.
+#[test]
+fn pictures_do_not_depend_on_when_they_are_drawn() {
+    let (packets, _) = slab(40, 3);
+    for levels in 0..=2 {
+        let mut late = decoder(levels);
+        for packet in &packets {
+            late.send_packet(&packet.data).expect("a good packet");
+        }
+        let mut live = decoder(levels);
+        for (k, packet) in packets.iter().enumerate() {
+            live.send_packet(&packet.data).expect("a good packet");
+            for part in [0.0, 0.4, 0.9] {
+                let frame = 40.0 + k as f64 + part;
+                assert!(picture(&mut live, frame) == picture(&mut late, frame), "level {levels} at {frame}");
+            }
+        }
+    }
+}
+
+#[test]
+fn pictures_are_those_of_the_coded_mesh() {
+    let (packets, mesh) = slab(7, 5);
+    for levels in 0..=2 {
+        let mut decoder = decoder(levels);
+        for packet in &packets {
+            decoder.send_packet(&packet.data).expect("a good packet");
+        }
+        for frame in [0.0, 2.5, 8.0] {
+            let found = picture(&mut decoder, 7.0 + frame).expect("a picture");
+            let mut data = vec![0; found.len()];
+            let planes = vec![Plane { data: &mut data, stride: 3 * SIZE.0 as usize }];
+            let mut surface = Surface::try_new(PixelFormat::Rgb, YuvMatrix::Bt601, SIZE, planes).expect("a surface");
+            tetvec::render::draw(&mesh, frame, levels, None, &mut surface).expect("the whole picture");
+            // Numbering differs, and with it the order of sums: by a rounding at most.
+            let off = found.iter().zip(&data).filter(|(a, b)| a.abs_diff(**b) > 1).count();
+            assert_eq!(off, 0, "level {levels} at {frame}");
+        }
+    }
+}
+
+#[test]
+fn times_are_clamped_to_what_has_come() {
+    let (packets, _) = slab(100, 3);
+    let mut decoder = decoder(1);
+    decoder.send_packet(&packets[0].data).expect("a keyframe");
+    decoder.send_packet(&packets[1].data).expect("a good packet");
+    let last = picture(&mut decoder, 102.0 - 1.0 / 1024.0).expect("a picture");
+    assert_eq!(picture(&mut decoder, 107.0), Ok(last), "beyond the packets");
+    let first = picture(&mut decoder, 100.0).expect("a picture");
+    assert_eq!(picture(&mut decoder, 3.0), Ok(first), "before the slab");
+}
+
+#[test]
+fn errors_leave_the_picture_and_wait_for_a_keyframe() {
+    let (packets, _) = slab(0, 3);
+    let (next, _) = slab(9, 4);
+    let mut decoder = decoder(1);
+    assert_eq!(picture(&mut decoder, 0.0), Err(DecodeError::NoKeyframe));
+    assert_eq!(decoder.send_packet(&packets[1].data), Err(DecodeError::NoKeyframe));
+    decoder.send_packet(&packets[0].data).expect("a keyframe");
+    let before = picture(&mut decoder, 0.0).expect("a picture");
+    let mut damaged = packets[1].data.clone();
+    damaged[30] ^= 4;
+    assert!(matches!(decoder.send_packet(&damaged), Err(DecodeError::Packet(_))));
+    assert_eq!(decoder.send_packet(&packets[2].data), Err(DecodeError::NoKeyframe));
+    assert_eq!(picture(&mut decoder, 0.0), Ok(before), "the frame before the damage");
+    let info = decoder.send_packet(&next[0].data).expect("a keyframe");
+    assert_eq!((info.frame_number, info.keyframe, info.picture), (9, true, true));
+    let header: Header = *decoder.header().expect("a header");
+    assert_eq!((header.width, header.height), (64, 48));
+    assert!(picture(&mut decoder, 9.0).is_ok());
+    decoder.flush();
+    assert_eq!(picture(&mut decoder, 9.0), Err(DecodeError::NoKeyframe));
+}
+
+#[test]
+fn unusable_viewports_are_refused() {
+    let (packets, _) = slab(0, 3);
+    let mut decoder = decoder(0);
+    decoder.send_packet(&packets[0].data).expect("a keyframe");
+    let mut data = [0; 12];
+    let planes = vec![Plane { data: &mut data, stride: 6 }];
+    let mut surface = Surface::try_new(PixelFormat::Rgb, YuvMatrix::Bt601, (2, 2), planes).expect("a surface");
+    let viewport = Viewport { x: 0.0, y: 0.0, width: 0.0, height: 5.0 };
+    assert!(matches!(decoder.render(0.0, Some(viewport), &mut surface), Err(DecodeError::Viewport(_))));
+}

@@ -1,0 +1,196 @@
+//! Frames through the encoder, the stream and the decoder, as an application uses them.
+
+#![cfg(feature = "encode")]
+
+mod clips;
+mod damage;
+
+use clips::{bars, config, decode, disc, encode, picture, psnr};
+use tetvec::metrics::simplification_ratio;
+use tetvec::{DecodeError, Decoder, DecoderConfig, EncodeError, Encoder, EncoderConfig, ErrorMetric, Frame, Surface};
+
+const SIZE: (u32, u32) = (24, 16);
+
+/// Videos of one frame, of two, and of about a window's length, for a short window and the default one.
+#[test]
+fn videos_of_any_length_come_back() {
+    for (window, lengths) in [(4, [1, 2, 3, 4, 5]), (10, [1, 2, 9, 10, 11])] {
+        for length in lengths {
+            let frames = disc(SIZE, 0, length);
+            let stream = encode(&frames, EncoderConfig { window, ..config(SIZE) }, &[]);
+            stream.check_framing(length.into());
+            assert_eq!(stream.keyframes(), [0], "{length} frames");
+            let decoded = decode(&stream.packets, SIZE, DecoderConfig::default());
+            let psnr = psnr(&frames, &decoded);
+            let floor = if length == 1 { 23.0 } else { 31.0 };
+            assert!(psnr > floor, "{length} frames, window {window}: {psnr:.1} dB");
+        }
+    }
+}
+
+/// Keyframes are where they are forced, where the longest slab ends and where the scene changes, and decoding can
+/// start at each.
+#[test]
+fn slabs_follow_each_other() {
+    let mut frames = disc(SIZE, 0, 7);
+    frames.extend(bars(SIZE, 7));
+    let stream = encode(&frames, EncoderConfig { key_int_max: 5, ..config(SIZE) }, &[3]);
+    stream.check_framing(frames.len() as u64);
+    assert_eq!(stream.keyframes(), [0, 3, 7, 12], "forced, scene cut, longest slab");
+    let decoded = decode(&stream.packets, SIZE, DecoderConfig::default());
+    let quality = psnr(&frames, &decoded);
+    assert!(quality > 28.0, "{quality:.1} dB");
+    for start in [3, 7, 12] {
+        let from_here = decode(&stream.packets[start..], SIZE, DecoderConfig::default());
+        assert!(from_here == decoded[start..], "decoding from keyframe {start}");
+    }
+    let mut decoder = Decoder::new(DecoderConfig::default());
+    assert_eq!(decoder.send_packet(&stream.packets[4].data), Err(DecodeError::NoKeyframe));
+}
+
+/// A picture between the last frame before a keyframe and the keyframe lies between both: slabs that follow each other
+/// leave no gap in time. Before a scene cut the old scene holds.
+#[test]
+fn time_flows_across_keyframes_but_not_across_cuts() {
+    let mut frames = disc(SIZE, 0, 6);
+    frames.extend(bars(SIZE, 2));
+    let stream = encode(&frames, EncoderConfig { simplification_ratio: 0.3, ..config(SIZE) }, &[3]);
+    let mut decoder = Decoder::new(DecoderConfig::default());
+    let mut between = |last: usize, time: f64| {
+        decoder.flush();
+        let slab = if last < 3 { 0..3 } else { 3..6 };
+        for k in slab {
+            decoder.send_packet(&stream.packets[k].data).expect("a good packet");
+        }
+        picture(&mut decoder, time, SIZE)
+    };
+    let towards_keyframe = between(2, 2.9);
+    assert!(
+        error(&frames[3], &towards_keyframe) < error(&frames[2], &towards_keyframe),
+        "2.9 is nearer to 3 than to 2"
+    );
+    let before_cut = between(5, 5.9);
+    assert!(error(&frames[5], &before_cut) < error(&frames[6], &before_cut), "5.9 holds frame 5");
+    assert!(before_cut == between(5, 5.0), "5.9 is frame 5");
+}
+
+/// Mean squared error in dB below the peak, negated: larger is worse.
+fn error(reference: &Frame, test: &Frame) -> f64 {
+    -psnr(std::slice::from_ref(reference), std::slice::from_ref(test))
+}
+
+#[test]
+fn settings_reach_the_stream() {
+    let frames = disc(SIZE, 0, 4);
+    for superpixels in [0, 1, 20] {
+        for subdivision_levels in 0..=2 {
+            let settings = EncoderConfig { superpixels, subdivision_levels, ..config(SIZE) };
+            let stream = encode(&frames, settings.clone(), &[]);
+            let mut decoder = Decoder::new(DecoderConfig::default());
+            decoder.send_packet(&stream.packets[0].data).expect("a keyframe");
+            assert_eq!(decoder.header(), Some(&settings.header()));
+            let decoded = decode(&stream.packets, SIZE, DecoderConfig::default());
+            let psnr = psnr(&frames, &decoded);
+            let what = format!("{superpixels} superpixels, level {subdivision_levels}");
+            assert!(psnr > 28.0, "{what}: {psnr:.1} dB");
+            // Drawing at another level than the one fitted for works as well.
+            let other = DecoderConfig { subdivision_levels: Some(2 - subdivision_levels), threads: 0 };
+            decode(&stream.packets, SIZE, other);
+        }
+    }
+}
+
+#[test]
+fn both_metrics_reach_the_ratio_asked_for() {
+    const LARGE: (u32, u32) = (48, 32);
+    let frames = disc(LARGE, 0, 5);
+    for (error_metric, asked, floor) in
+        [(ErrorMetric::Color, 0.04, 33.0), (ErrorMetric::Color, 0.15, 42.0), (ErrorMetric::Paper, 0.04, 31.0)]
+    {
+        let settings = EncoderConfig { error_metric, simplification_ratio: asked, ..config(LARGE) };
+        let stream = encode(&frames, settings, &[]);
+        let found = simplification_ratio(stream.vertices, LARGE.0, LARGE.1, frames.len() as u64);
+        assert!((found / asked - 1.0).abs() < 0.2, "{error_metric:?}: asked for {asked}, found {found}");
+        let psnr = psnr(&frames, &decode(&stream.packets, LARGE, DecoderConfig::default()));
+        assert!(psnr > floor, "{error_metric:?} at {asked}: {psnr:.1} dB");
+    }
+}
+
+#[test]
+fn threads_change_neither_bytes_nor_pixels() {
+    let mut frames = disc(SIZE, 0, 6);
+    frames.extend(bars(SIZE, 3));
+    let [one, two] = [1, 2].map(|threads| encode(&frames, EncoderConfig { threads, ..config(SIZE) }, &[]));
+    assert!(one.bytes() == two.bytes(), "bytes with 1 and 2 threads");
+    for levels in 0..=2 {
+        let draw = |threads| {
+            let config = DecoderConfig { subdivision_levels: Some(levels), threads };
+            decode(&one.packets, (197, 131), config)
+        };
+        assert!(draw(1) == draw(2), "pixels with 1 and 2 threads at level {levels}");
+    }
+}
+
+/// `cat a.tetv b.tetv` plays as one: frame numbers restart, pictures are those of each alone.
+#[test]
+fn streams_behind_each_other_play_as_one() {
+    let first = encode(&disc(SIZE, 0, 3), config(SIZE), &[]);
+    let second = encode(&disc((16, 20), 5, 2), config((16, 20)), &[]);
+    let both: Vec<_> = first.packets.iter().chain(&second.packets).cloned().collect();
+    let decoded = decode(&both, SIZE, DecoderConfig::default());
+    assert_eq!(decoded.len(), 5);
+    assert!(decoded[..3] == decode(&first.packets, SIZE, DecoderConfig::default()));
+    assert!(decoded[3..] == decode(&second.packets, SIZE, DecoderConfig::default()));
+}
+
+#[test]
+fn the_smallest_pictures_come_back() {
+    for size in [(1, 1), (2, 1), (1, 7), (3, 3)] {
+        let frames = disc(size, 0, 5);
+        let stream = encode(&frames, EncoderConfig { simplification_ratio: 1.0, ..config(size) }, &[2]);
+        stream.check_framing(5);
+        let psnr = psnr(&frames, &decode(&stream.packets, size, DecoderConfig::default()));
+        assert!(psnr > 20.0, "{size:?}: {psnr:.1} dB");
+        let large = decode(&stream.packets, (33, 1), DecoderConfig::default());
+        assert_eq!(large.len(), 5, "{size:?} drawn at another size");
+    }
+}
+
+/// Where nothing moves, pictures differ less from each other than if their errors were independent, which would be
+/// twice the squared error of each, 3 dB.
+#[test]
+fn a_still_scene_is_still() {
+    let frames = vec![disc(SIZE, 3, 1).remove(0); 9];
+    let stream = encode(&frames, config(SIZE), &[]);
+    let decoded = decode(&stream.packets, SIZE, DecoderConfig::default());
+    let (flicker, quality) = (psnr(&decoded[1..], &decoded[..8]), psnr(&frames, &decoded));
+    assert!(flicker > quality - 3.0, "{flicker:.1} dB from frame to frame, {quality:.1} dB from the source");
+}
+
+#[test]
+fn an_empty_stream_is_empty() {
+    let mut encoder = Encoder::try_new(config(SIZE)).expect("settings in range");
+    encoder.finish().expect("nothing to write");
+    assert_eq!(encoder.receive_packet(), None);
+    assert_eq!(encoder.vertices(), 0);
+    let frame = disc(SIZE, 0, 1).remove(0);
+    assert_eq!(encoder.send_frame(frame, false), Err(EncodeError::Finished));
+    let mut decoder = Decoder::new(DecoderConfig::default());
+    assert!(decoder.header().is_none());
+    assert!(decoder.send_packet(&[]).is_err());
+    let mut picture = Frame::from_fn(4, 4, |_, _| [0; 3]).expect("a size within the limits");
+    assert_eq!(decoder.render(0.0, None, &mut Surface::of_frame(&mut picture)), Err(DecodeError::NoKeyframe));
+}
+
+#[test]
+fn frames_of_another_size_are_refused_and_the_stream_goes_on() {
+    let mut encoder = Encoder::try_new(config((4, 4))).expect("settings in range");
+    for frame in disc((4, 4), 0, 2) {
+        let other = disc((5, 4), 0, 1).remove(0);
+        let refused = encoder.send_frame(other, false);
+        assert_eq!(refused, Err(EncodeError::FrameSize { expected: (4, 4), found: (5, 4) }));
+        encoder.send_frame(frame, false).expect("a good frame");
+    }
+    encoder.finish().expect("a stream");
+    assert_eq!(std::iter::from_fn(|| encoder.receive_packet()).count(), 3);
+}

@@ -1,0 +1,228 @@
+//! Edge collapse: the mesh stays a tiling, colours and surfaces stay where they belong, windows join.
+#![cfg(feature = "encode")]
+
+use std::sync::Arc;
+
+use glam::{IVec3, Vec3};
+use proptest::prelude::{ProptestConfig, any, prop, proptest};
+use tetvec::Frame;
+use tetvec::mesh::{Domain, TetMesh, validate, volume6};
+use tetvec::vectorize::cleave::cleave;
+use tetvec::vectorize::lattice::Lattice;
+use tetvec::vectorize::simplify::{
+    ColorQuadric, DistanceQuadric, Goal, Refusal, SimplifyParams, SimplifyReport, Topology, Unfrozen, WedgeQuadric,
+    WorkMesh, simplify,
+};
+use tetvec::video::{Label, LabelPlane};
+
+const ALL: Unfrozen = Unfrozen { low: -1, high: i32::MAX };
+
+fn goal(vertices: usize) -> Goal {
+    Goal { vertices, before: i32::MAX, vertices_in_window: usize::MAX, max_cost: f32::MAX, max_error: f32::INFINITY }
+}
+
+struct Clip {
+    domain: Domain,
+    frames: Vec<Arc<Frame>>,
+    labels: Vec<LabelPlane>,
+}
+
+impl Clip {
+    fn new(
+        [width, height, planes]: [u32; 3],
+        color: impl Fn(u32, u32, u32) -> [u8; 3],
+        label: impl Fn(u32, u32, u32) -> u32,
+    ) -> Self {
+        let frame = |t| Arc::new(Frame::from_fn(width, height, |x, y| color(x, y, t)).unwrap());
+        let plane = |t| {
+            let labels = (0..width * height).map(|i| Label(label(i % width, i / width, t))).collect();
+            LabelPlane::new(width, height, labels)
+        };
+        Self {
+            domain: Domain { width, height, duration: planes - 1, subpixel_bits: 3 },
+            frames: (0..planes).map(frame).collect(),
+            labels: (0..planes).map(plane).collect(),
+        }
+    }
+
+    /// The lattice of planes `first` to `last`.
+    fn run(&self, first: usize, last: usize) -> TetMesh {
+        let lattice =
+            Lattice::try_new(self.domain, first as u32, &self.frames[first..=last], &self.labels[first..=last]);
+        cleave(&lattice.unwrap()).unwrap()
+    }
+
+    fn whole(&self) -> TetMesh {
+        self.run(0, self.frames.len() - 1)
+    }
+
+    fn simplified<Q: WedgeQuadric>(&self, vertices: usize, params: &SimplifyParams) -> (TetMesh, SimplifyReport) {
+        let mut work = WorkMesh::<Q>::new(self.domain);
+        work.append(&self.whole(), params.surface_weight);
+        let report = simplify(&mut work, ALL, goal(vertices), params);
+        let mut mesh = TetMesh::empty(self.domain);
+        work.commit(i32::MAX, &mut mesh);
+        (mesh, report)
+    }
+}
+
+fn volume_of_label(mesh: &TetMesh, label: u32) -> i64 {
+    let tets = (0..mesh.tets.len()).filter(|&tet| mesh.tet_label(tet) == Label(label));
+    tets.map(|tet| mesh.tet_positions(tet)).map(|[a, b, c, d]| volume6(a, b, c, d)).sum()
+}
+
+fn textured(x: u32, y: u32, t: u32) -> [u8; 3] {
+    [(x * 37 + y * 11 + t * 5) as u8, (x * y * 3 + t * 40) as u8, ((x ^ y ^ t) as u8).wrapping_mul(16)]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    #[test]
+    fn stays_a_tiling(
+        size in prop::array::uniform3(2u32..7),
+        seed in any::<u32>(),
+        labels in 1u32..4,
+        share in 0.02f64..0.6,
+        strict in any::<bool>(),
+        distance in any::<bool>(),
+    ) {
+        let noise = |x: u32, y: u32, t: u32| {
+            (x ^ y.rotate_left(9) ^ t.rotate_left(18) ^ seed).wrapping_mul(0x9e37_79b1) >> 24
+        };
+        let clip = Clip::new(size, |x, y, t| [noise(x, y, t) as u8; 3], |x, y, t| noise(x / 2, y / 2, t / 2) % labels);
+        let params = SimplifyParams {
+            topology: if strict { Topology::Strict } else { Topology::Free },
+            ..SimplifyParams::default()
+        };
+        let start = clip.whole();
+        let vertices = (start.positions.len() as f64 * share) as usize;
+        let (mesh, report) = if distance {
+            clip.simplified::<DistanceQuadric>(vertices, &params)
+        } else {
+            clip.simplified::<ColorQuadric>(vertices, &params)
+        };
+        assert_eq!(validate(&mesh), Ok(()));
+        assert_eq!(mesh.positions.len() as u64 + report.collapses, start.positions.len() as u64);
+        assert_eq!(mesh.positions.len(), report.vertices);
+        assert!(mesh.wedges.iter().all(|wedge| wedge.color.is_finite()));
+        if strict {
+            for label in 0..labels {
+                let volume = (volume_of_label(&start, label), volume_of_label(&mesh, label));
+                assert_eq!(volume.0 > 0, volume.1 > 0, "strict topology loses no label");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_linear_field_costs_nothing() {
+    let clip = Clip::new([12, 10, 8], |x, y, t| [(10 * x + 5) as u8, (20 * y) as u8, (8 * t + x) as u8], |_, _, _| 0);
+    let (mesh, report) = clip.simplified::<ColorQuadric>(60, &SimplifyParams::default());
+    assert_eq!(validate(&mesh), Ok(()));
+    assert!(mesh.positions.len() <= 60, "reaches its goal, found {} ({report:?})", mesh.positions.len());
+    for wedge in &mesh.wedges {
+        let p = mesh.positions[wedge.vertex.index()];
+        // The outermost half pixel repeats the sample at the border's centre instead of going on.
+        let inner = |value: i32, size: u32| (value as f32 / 8.0 - 0.5).clamp(0.0, size as f32 - 1.0);
+        let (x, y, t) = (inner(p.x, 12), inner(p.y, 10), p.z as f32 / 8.0);
+        let expected = Vec3::new(10.0 * x + 5.0, 20.0 * y, 8.0 * t + x);
+        assert!((wedge.color - expected).abs().max_element() < 12.0, "{:?} at {p}, expected {expected}", wedge.color);
+    }
+}
+
+#[test]
+fn a_flat_surface_stays_flat() {
+    let label = |x: u32, _: u32, _: u32| u32::from(x >= 6);
+    let clip = Clip::new([12, 12, 8], |x, _, _| if x >= 6 { [200, 20, 20] } else { [10, 90, 160] }, label);
+    let (mesh, _) = clip.simplified::<ColorQuadric>(80, &SimplifyParams::default());
+    assert_eq!(validate(&mesh), Ok(()));
+    let half = clip.domain.volume6() / 2;
+    let drift = (volume_of_label(&mesh, 0) - half).abs();
+    assert!(200 * drift < half, "the uniformity term moves surfaces by less than 1/200, found {drift} of {half}");
+    let mut colors: Vec<[i32; 3]> = mesh.wedges.iter().map(|w| w.color.round().as_ivec3().to_array()).collect();
+    colors.sort_unstable();
+    colors.dedup();
+    assert_eq!(colors, [[10, 90, 160], [200, 20, 20]], "no colour leaks over the surface");
+}
+
+#[test]
+fn frozen_vertices_stay() {
+    let clip = Clip::new([8, 8, 9], textured, |x, y, _| u32::from(x > y));
+    let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
+    work.append(&clip.whole(), 100.0);
+    let unfrozen = Unfrozen { low: 2 * 8, high: 6 * 8 };
+    let params = SimplifyParams::default();
+    let report = simplify(&mut work, unfrozen, goal(0), &params);
+    let mut mesh = TetMesh::empty(clip.domain);
+    work.commit(i32::MAX, &mut mesh);
+    assert_eq!(validate(&mesh), Ok(()));
+    let frozen = |mesh: &TetMesh| {
+        let outside = |p: &&IVec3| p.z <= unfrozen.low || p.z >= unfrozen.high;
+        let mut list: Vec<[i32; 3]> = mesh.positions.iter().filter(outside).map(|p| p.to_array()).collect();
+        list.sort_unstable();
+        list
+    };
+    let whole = clip.whole();
+    let (before, after) = (frozen(&whole), frozen(&mesh));
+    assert!(before.iter().all(|p| after.binary_search(p).is_ok()), "every frozen vertex is still there");
+    assert!(mesh.positions.len() < whole.positions.len(), "and others went: {report:?}");
+}
+
+#[test]
+fn windows_join_into_one_tiling() {
+    let clip = Clip::new([10, 9, 13], textured, |x, y, t| u32::from((x + t) / 6 > y / 3));
+    let params = SimplifyParams { max_extent_frames: 4, ..SimplifyParams::default() };
+    let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
+    let mut mesh = TetMesh::empty(clip.domain);
+    let mut low = -1;
+    for (first, last) in [(0, 4), (4, 8), (8, 12)] {
+        work.append(&clip.run(first, last), params.surface_weight);
+        let end = last == 12;
+        let high = if end { i32::MAX } else { (last as i32 - 1) * 8 };
+        simplify(&mut work, Unfrozen { low, high }, goal(60), &params);
+        low = if end { i32::MAX } else { (last as i32 - 2) * 8 };
+        let tets_before = mesh.tets.clone();
+        work.commit(low, &mut mesh);
+        assert_eq!(mesh.tets[..tets_before.len()], tets_before, "what is committed stays");
+    }
+    assert_eq!(validate(&mesh), Ok(()));
+    for tet in 0..mesh.tets.len() {
+        let times = mesh.tet_positions(tet).map(|p| p.z);
+        assert!(times.iter().max().unwrap() - times.iter().min().unwrap() <= 2 * 4 * 8);
+    }
+}
+
+#[test]
+fn stops_at_the_error() {
+    let clip = Clip::new([10, 10, 6], textured, |_, _, _| 0);
+    let params = SimplifyParams::default();
+    let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
+    work.append(&clip.whole(), params.surface_weight);
+    let report = simplify(&mut work, ALL, Goal { max_cost: 50.0, ..goal(0) }, &params);
+    assert!(report.max_cost <= 50.0 * 1.05, "a bucket is 1/16 octave wide, found {}", report.max_cost);
+    let further = simplify(&mut work, ALL, Goal { max_cost: 5000.0, ..goal(0) }, &params);
+    assert!(further.vertices < report.vertices);
+}
+
+#[test]
+fn refusals_have_names() {
+    let clip = Clip::new([6, 6, 4], textured, |x, _, _| x / 2);
+    let params = SimplifyParams { topology: Topology::Strict, ..SimplifyParams::default() };
+    let (_, report) = clip.simplified::<ColorQuadric>(0, &params);
+    for refusal in [Refusal::Sides, Refusal::Labels, Refusal::Flip] {
+        assert!(report.refusals.count(refusal) > 0, "{refusal:?} in {report:?}");
+    }
+}
+
+#[test]
+fn same_mesh_with_any_number_of_threads() {
+    let clip = Clip::new([20, 16, 7], textured, |x, y, t| (x + t) / 7 + 3 * (y / 8));
+    let params = SimplifyParams::default();
+    let meshes = [1, 2, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| clip.simplified::<ColorQuadric>(200, &params)).0
+    });
+    assert_eq!(meshes[0], meshes[1]);
+    assert_eq!(meshes[0], meshes[2]);
+}
