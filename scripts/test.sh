@@ -44,7 +44,9 @@ step "examples and benches"
 cargo build --locked --workspace --examples --benches
 
 step "meson"
-meson setup "$work/build" >/dev/null
+# Meson refuses a build file dated in the future, which is what a clone has where the clock was set back since.
+touch meson.build
+meson setup "$work/build"
 meson compile -C "$work/build"
 meson test -C "$work/build" --suite plugin --print-errorlogs
 DESTDIR=$work/root meson install -C "$work/build" --no-rebuild
