@@ -5,6 +5,7 @@
 
 mod config;
 mod readiness;
+mod runs;
 mod slab;
 
 use std::collections::VecDeque;
@@ -12,7 +13,7 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
-pub use self::config::{EncoderConfig, ErrorMetric};
+pub use self::config::{EncoderConfig, ErrorMetric, LatticeKind, SpeedPreset};
 use self::slab::{SlabEncoder, SlabEnd, WindowEncoder};
 use crate::bitstream::{IndexWriter, Packet, SequenceHeader, WriteError};
 use crate::vectorize::cleave::CleaveError;
@@ -124,7 +125,7 @@ impl Encoder {
 
     /// Most frames that are held back before their packets come out.
     pub fn latency_frames(&self) -> u32 {
-        slab::latency_frames(self.config.window).min(self.config.slab_frames())
+        slab::latency_frames(&self.config).min(self.config.slab_frames())
     }
 
     /// Takes the next frame; packets that became ready wait in [`Self::receive_packet`]. With `force_keyframe` a new

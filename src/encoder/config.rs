@@ -2,6 +2,8 @@
 
 use super::EncodeError;
 use crate::bitstream::{Fraction, Limits, SequenceHeader};
+use crate::vectorize::lattice::AdaptiveLattice;
+use crate::vectorize::simplify::Topology;
 use crate::video::Frame;
 
 /// What the error quadrics of the simplification measure.
@@ -11,6 +13,31 @@ pub enum ErrorMetric {
     #[default]
     Color,
     /// The paper's: squared distance in (x, y, t, r, g, b), §IV-A.
+    Paper,
+}
+
+/// What the window's mesh starts from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LatticeKind {
+    /// Bisected where colours or labels ask for it.
+    #[default]
+    Adaptive,
+    /// One vertex a pixel and frame, as in the paper.
+    Dense,
+}
+
+/// Points of time spent against error reached, measured in docs/benchmarks.md.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SpeedPreset {
+    /// Colours alone are fitted, to a mesh from a coarse lattice, in short windows.
+    Fast,
+    /// Positions and colours are fitted.
+    #[default]
+    Medium,
+    /// From a finer lattice.
+    Slow,
+    /// As the paper has it: dense lattice, labels, strict topology, its metric, windows of 10 frames, one level of
+    /// subdivision, surfaces and colours fitted.
     Paper,
 }
 
@@ -29,17 +56,27 @@ pub struct EncoderConfig {
     pub simplification_ratio: f64,
     /// Mean absolute error per channel to simplify up to, in 8-bit levels; 0: off, the ratio decides.
     pub target_error: f64,
-    /// Length T of the sliding window in frames (§VI), [`Self::WINDOW`].
+    /// Length T of the sliding window in frames (§VI), [`Self::WINDOW`]; from `key_int_max` on a slab is simplified as a
+    /// whole, which reaches the lowest error.
     pub window: u32,
     /// Most frames from one keyframe to the next, [`Self::KEY_INT_MAX`].
     pub key_int_max: u32,
     /// Mean number of superpixels a frame; 0: chosen by content; 1: no discontinuities, which reaches the lowest error at
     /// a given ratio as long as surfaces are fitted to pixel labels (docs/benchmarks.md).
     pub superpixels: u32,
-    /// Levels of subdivision that the decoder is to draw with, and the fit fits for: 0 to 2.
+    /// Levels of subdivision that the decoder is to draw with, and the fit fits for: 0 to 2. Level 0 reaches the lowest
+    /// error and the sharpest edges, level 1 smoother pictures when enlarged.
     pub subdivision_levels: u8,
     /// What the quadrics measure.
     pub error_metric: ErrorMetric,
+    /// What the mesh starts from.
+    pub lattice: LatticeKind,
+    /// Vertices that an adaptive lattice starts with for each that is to be left, [`Self::LATTICE_DENSITY`].
+    pub lattice_density: f64,
+    /// How strictly the topology of labels is kept.
+    pub topology: Topology,
+    /// Steps of the position optimisation, [`Self::POSITION_STEPS`]; 0: positions stay where edges collapsed to.
+    pub position_steps: u32,
     /// Worker threads; 0: all cores. Bytes do not depend on it.
     pub threads: usize,
 }
@@ -55,6 +92,10 @@ impl EncoderConfig {
     pub const KEY_INT_MAX: std::ops::RangeInclusive<u32> = 1..=600;
     /// Range of `superpixels`.
     pub const SUPERPIXELS: std::ops::RangeInclusive<u32> = 0..=10_000;
+    /// Range of `lattice_density`.
+    pub const LATTICE_DENSITY: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
+    /// Range of `position_steps`.
+    pub const POSITION_STEPS: std::ops::RangeInclusive<u32> = 0..=100;
     /// Range of `subdivision_levels`.
     pub const SUBDIVISION_LEVELS: std::ops::RangeInclusive<u8> = 0..=2;
 
@@ -67,12 +108,48 @@ impl EncoderConfig {
             pixel_aspect_ratio: Fraction { numerator: 1, denominator: 1 },
             simplification_ratio: 0.01,
             target_error: 0.0,
-            window: 10,
+            window: 60,
             key_int_max: 60,
             superpixels: 1,
-            subdivision_levels: 1,
+            subdivision_levels: 0,
             error_metric: ErrorMetric::Color,
+            lattice: LatticeKind::Adaptive,
+            lattice_density: 12.0,
+            topology: Topology::Free,
+            position_steps: 12,
             threads: 0,
+        }
+    }
+
+    /// The same with what `preset` sets: everything but sizes, rates, goals, keyframes and threads.
+    #[must_use]
+    pub fn with_preset(self, preset: SpeedPreset) -> Self {
+        let medium = Self::new(self.width, self.height);
+        let base = Self {
+            window: medium.window,
+            superpixels: medium.superpixels,
+            subdivision_levels: medium.subdivision_levels,
+            error_metric: medium.error_metric,
+            lattice: medium.lattice,
+            lattice_density: medium.lattice_density,
+            topology: medium.topology,
+            position_steps: medium.position_steps,
+            ..self
+        };
+        match preset {
+            SpeedPreset::Fast => Self { window: 10, lattice_density: 3.0, position_steps: 0, ..base },
+            SpeedPreset::Medium => base,
+            SpeedPreset::Slow => Self { lattice_density: 24.0, position_steps: 24, ..base },
+            SpeedPreset::Paper => Self {
+                window: 10,
+                superpixels: 0,
+                subdivision_levels: 1,
+                error_metric: ErrorMetric::Paper,
+                lattice: LatticeKind::Dense,
+                topology: Topology::Strict,
+                position_steps: 0,
+                ..base
+            },
         }
     }
 
@@ -94,6 +171,10 @@ impl EncoderConfig {
         if !Self::TARGET_ERROR.contains(&self.target_error) {
             return Err(setting("target_error", &Self::TARGET_ERROR, self.target_error));
         }
+        if !Self::LATTICE_DENSITY.contains(&self.lattice_density) {
+            return Err(setting("lattice_density", &Self::LATTICE_DENSITY, self.lattice_density));
+        }
+        in_range("position_steps", self.position_steps, Self::POSITION_STEPS)?;
         if self.frames_within_limits() == 0 {
             let found = format!("{} at {}x{}", self.simplification_ratio, self.width, self.height);
             return Err(setting("simplification_ratio x width x height", &(0..=Limits::default().max_vertices), found));
@@ -115,6 +196,29 @@ impl EncoderConfig {
     /// Most frames of a slab: `key_int_max`, or fewer where a slab's mesh would be more than decoders accept.
     pub fn slab_frames(&self) -> u32 {
         self.key_int_max.min(self.frames_within_limits())
+    }
+
+    /// Frame steps of a run of lattice: half a window, or equal parts of it that an adaptive lattice can have.
+    pub(super) fn run_steps(&self) -> u32 {
+        let half = self.window / 2;
+        match self.lattice {
+            LatticeKind::Dense => half,
+            LatticeKind::Adaptive => {
+                let half = half.max(AdaptiveLattice::MIN_CUT);
+                half.div_ceil(half.div_ceil(AdaptiveLattice::MAX_STEPS))
+            }
+        }
+    }
+
+    /// Frames behind the window's leading plane that are kept after a step: with the next run they are the window. A window
+    /// as long as a slab keeps all.
+    pub(super) fn kept_frames(&self) -> u32 {
+        if self.window >= self.slab_frames() { u32::MAX } else { self.window.saturating_sub(self.run_steps()).max(1) }
+    }
+
+    /// Vertices a pixel that an adaptive lattice starts with.
+    pub(super) fn lattice_ratio(&self) -> f64 {
+        (self.simplification_ratio * self.lattice_density).min(1.0)
     }
 
     /// Frames whose mesh decoders accept, with room for the plane that joins the next slab.
@@ -160,6 +264,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn presets_leave_goals_alone() {
+        let mine =
+            EncoderConfig { simplification_ratio: 0.05, key_int_max: 30, threads: 1, ..EncoderConfig::new(64, 48) };
+        for preset in [SpeedPreset::Fast, SpeedPreset::Medium, SpeedPreset::Slow, SpeedPreset::Paper] {
+            let set = mine.clone().with_preset(preset);
+            assert_eq!(set.validate(), Ok(()));
+            assert_eq!((set.simplification_ratio, set.key_int_max, set.threads), (0.05, 30, 1));
+            assert_eq!(set.with_preset(SpeedPreset::Medium), mine, "each sets all that another does");
+        }
+    }
+
+    #[test]
     fn names_the_field_out_of_range() {
         let good = EncoderConfig::new(320, 240);
         assert_eq!(good.validate(), Ok(()));
@@ -170,6 +286,8 @@ mod tests {
         assert_eq!(field(EncoderConfig::new(0, 240)), "width x height");
         assert_eq!(field(EncoderConfig { simplification_ratio: f64::NAN, ..good.clone() }), "simplification_ratio");
         assert_eq!(field(EncoderConfig { target_error: -1.0, ..good.clone() }), "target_error");
+        assert_eq!(field(EncoderConfig { lattice_density: 0.5, ..good.clone() }), "lattice_density");
+        assert_eq!(field(EncoderConfig { position_steps: 101, ..good.clone() }), "position_steps");
         assert_eq!(field(EncoderConfig { window: 3, ..good.clone() }), "window");
         assert_eq!(field(EncoderConfig { key_int_max: 0, ..good.clone() }), "key_int_max");
         assert_eq!(field(EncoderConfig { subdivision_levels: 3, ..good }), "subdivision_levels");

@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::readiness::{FAR, hops};
+use super::runs::{Run, Runs};
 use super::{EncodeError, EncoderConfig};
 use crate::bitstream::{Packet, RINGS, SlabWriter};
 use crate::mesh::{Domain, StarTable, TetMesh};
-use crate::vectorize::cleave::cleave;
 use crate::vectorize::fit::{FitParams, FitRequest, fit};
-use crate::vectorize::lattice::Lattice;
+use crate::vectorize::lattice::AdaptiveLattice;
 use crate::vectorize::simplify::{Goal, SimplifyParams, Unfrozen, WedgeQuadric, WorkMesh, simplify};
 use crate::video::{Frame, LabelPlane, Volume};
 
@@ -55,9 +55,10 @@ pub(super) trait WindowEncoder: Send {
 
 /// Most frames between the arrival of a frame and its packet with windows of `window` frames: the packet's tets and
 /// those around their vertices reach `RINGS + 1` tets of at most a window each beyond it, what is committed and what is
-/// in the lattice lag behind by half a window each, and packets leave by the window.
-pub(super) fn latency_frames(window: u32) -> u32 {
-    (u32::from(RINGS) + 3) * window + 2
+/// in the lattice lag behind by less than a window each, and packets leave by the window. An adaptive lattice waits for
+/// the run after the next and for what could be too short to be one.
+pub(super) fn latency_frames(config: &EncoderConfig) -> u32 {
+    (u32::from(RINGS) + 3) * config.window + 2 * config.run_steps() + AdaptiveLattice::MIN_CUT + 2
 }
 
 /// Vectorises one slab.
@@ -65,7 +66,8 @@ pub(super) struct SlabEncoder<Q> {
     ratio: f64,
     target_error: f64,
     error_gain: f64,
-    half_window: u32,
+    /// Frames behind the window's leading plane that are kept after a step.
+    kept: u32,
     /// Packets that are fitted and written together, to look at each frame less often.
     batch: u32,
     simplify_params: SimplifyParams,
@@ -73,14 +75,13 @@ pub(super) struct SlabEncoder<Q> {
     work: WorkMesh<Q>,
     committed: TetMesh,
     writer: SlabWriter,
-    /// Planes that are not in the lattice yet, and before them the one that the next run starts with.
-    waiting: Vec<(Arc<Frame>, LabelPlane)>,
+    runs: Runs,
     /// Frames that the fit may still need, and their labels.
     volume: Volume,
     labels: VecDeque<(u32, LabelPlane)>,
     planes: u32,
-    /// Planes in the lattice.
-    built: u32,
+    /// Last plane in the lattice.
+    lead: u32,
     frozen: i32,
     sent: u32,
 }
@@ -99,22 +100,27 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             ratio: config.simplification_ratio,
             target_error: config.target_error,
             error_gain,
-            half_window: config.window / 2,
+            kept: config.kept_frames(),
             batch: config.window,
-            simplify_params: SimplifyParams { max_extent_frames: config.window, ..SimplifyParams::default() },
+            simplify_params: SimplifyParams {
+                max_extent_frames: config.window,
+                topology: config.topology,
+                ..SimplifyParams::default()
+            },
             fit_params: FitParams {
                 subdivision_levels: config.subdivision_levels,
                 color_step: header.color_step,
+                position_iterations: config.position_steps,
                 ..FitParams::default()
             },
             work: WorkMesh::new(domain),
             committed: TetMesh::empty(domain),
             writer: SlabWriter::try_new(header, first_frame)?,
-            waiting: Vec::new(),
+            runs: Runs::new(domain, config),
             volume: Volume::new(0),
             labels: VecDeque::new(),
             planes: 0,
-            built: 0,
+            lead: 0,
             frozen: -1,
             sent: 0,
         })
@@ -123,22 +129,30 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     fn take(&mut self, frame: Arc<Frame>, labels: LabelPlane) {
         self.volume.push(frame.clone());
         self.labels.push_back((self.planes, labels.clone()));
-        self.waiting.push((frame, labels));
+        self.runs.push(frame, labels);
         self.planes += 1;
     }
 
-    /// Puts the waiting planes into the lattice and simplifies; with `frames` the slab has ended and has that many.
-    fn step(&mut self, frames: Option<u32>) -> Result<Vec<Packet>, EncodeError> {
-        if let Some(frames) = frames {
-            let duration = self.planes - 1;
-            self.work.set_duration(duration);
-            self.committed.domain.duration = duration;
-            debug_assert!(frames == duration || frames == duration + 1);
+    /// Puts the runs that are ready into the window, one after another.
+    fn advance(&mut self, frames: Option<u32>) -> Result<Vec<Packet>, EncodeError> {
+        let mut packets = Vec::new();
+        let runs = self.runs.take_ready(frames.is_some())?;
+        let count = runs.len();
+        for (n, Run { mesh, last }) in runs.into_iter().enumerate() {
+            self.work.append(&mesh, self.simplify_params.surface_weight);
+            self.lead = last;
+            log::debug!("run up to frame {last}: {} vertices, {} tets", mesh.positions.len(), mesh.tets.len());
+            drop(mesh);
+            packets.extend(self.step(frames.filter(|_| n + 1 == count))?);
         }
-        self.extend_lattice()?;
+        Ok(packets)
+    }
+
+    /// Simplifies and hands on; with `frames` the slab has ended and has that many.
+    fn step(&mut self, frames: Option<u32>) -> Result<Vec<Packet>, EncodeError> {
         let unit = self.committed.domain.unit();
-        let lead = self.planes as i32 - 1;
-        let high = if frames.is_some() { i32::MAX } else { (lead - 1) * unit };
+        let lead = self.lead as i32;
+        let high = if frames.is_some() { i32::MAX } else { lead * unit };
         let goal = self.goal(frames, lead);
         let unfrozen = Unfrozen { low: self.frozen, high };
         let report = simplify(&mut self.work, unfrozen, goal, &self.simplify_params);
@@ -159,7 +173,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let pixels = f64::from(domain.width) * f64::from(domain.height);
         let handed_on = self.committed.positions.len() - self.work.committed_vertices().len();
         let allowed = |frames: f64| ((self.ratio * frames * pixels).round() as usize).saturating_sub(handed_on);
-        let trailing = frames.unwrap_or((lead - self.half_window as i32).max(0) as u32);
+        let trailing = frames.unwrap_or((lead as u32).saturating_sub(self.kept));
         let counted = f64::from(trailing) - f64::from(self.frozen.max(0)) / f64::from(domain.unit());
         let steered = self.target_error > 0.0;
         Goal {
@@ -175,21 +189,6 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
                 false => f32::INFINITY,
             },
         }
-    }
-
-    fn extend_lattice(&mut self) -> Result<(), EncodeError> {
-        if self.waiting.len() < 2 {
-            return Ok(());
-        }
-        let first = self.built.saturating_sub(1);
-        let (frames, labels): (Vec<Arc<Frame>>, Vec<LabelPlane>) = self.waiting.drain(..).unzip();
-        self.built = self.planes;
-        let lattice = Lattice::try_new(self.committed.domain, first, &frames, &labels)?;
-        let run = cleave(&lattice)?;
-        self.work.append(&run, self.simplify_params.surface_weight);
-        // The next run starts with this one's last plane.
-        self.waiting.extend(frames.into_iter().zip(labels).next_back());
-        Ok(())
     }
 
     /// Fits and writes the packets whose tets are committed.
@@ -264,8 +263,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
 impl<Q: WedgeQuadric> WindowEncoder for SlabEncoder<Q> {
     fn push(&mut self, frame: Arc<Frame>, labels: LabelPlane) -> Result<Vec<Packet>, EncodeError> {
         self.take(frame, labels);
-        // The first run has one plane more than the others, which start with their predecessor's last.
-        if self.waiting.len() as u32 > self.half_window { self.step(None) } else { Ok(Vec::new()) }
+        self.advance(None)
     }
 
     fn planes(&self) -> u32 {
@@ -278,13 +276,17 @@ impl<Q: WedgeQuadric> WindowEncoder for SlabEncoder<Q> {
             SlabEnd::Joined(frame, labels) => self.take(frame, labels),
             SlabEnd::Held if frames == 1 => {
                 // A slab of one frame repeats it: a mesh needs an extent in time.
-                if let Some((frame, labels)) = self.waiting.first().cloned() {
+                let labels = self.labels.front().map(|(_, labels)| labels.clone());
+                if let (Some(frame), Some(labels)) = (self.volume.frame(0).cloned(), labels) {
                     self.take(frame, labels);
                 }
             }
             SlabEnd::Held => {}
         }
-        let packets = self.step(Some(frames))?;
+        let duration = self.planes - 1;
+        self.work.set_duration(duration);
+        self.committed.domain.duration = duration;
+        let packets = self.advance(Some(frames))?;
         let vertices = self.committed.positions.len() as u64;
         Ok(FinishedSlab { packets, vertices, error_gain: self.error_gain })
     }

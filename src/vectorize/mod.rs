@@ -5,5 +5,6 @@
 pub mod cleave;
 pub mod fit;
 pub mod lattice;
+mod parallel;
 pub mod segment;
 pub mod simplify;

@@ -18,6 +18,7 @@ mod fill;
 mod plan;
 mod point;
 mod slots;
+mod split;
 mod stencil;
 
 use glam::{IVec3, Vec3};
@@ -26,8 +27,10 @@ use thiserror::Error;
 use self::fill::{Filler, split_rows};
 use self::plan::Plan;
 use self::slots::PlaceTable;
+pub use self::split::cleave_tets;
 use self::stencil::StencilTable;
 use super::lattice::Lattice;
+use super::parallel::for_each;
 use crate::mesh::{TetMesh, VertexId, Wedge, WedgeId};
 use crate::video::Label;
 
@@ -70,15 +73,26 @@ pub fn cleave(lattice: &Lattice) -> Result<TetMesh, CleaveError> {
     Ok(mesh)
 }
 
-/// Does independent jobs, on all threads where there are some.
-#[cfg(feature = "threads")]
-fn for_each<T: Send>(jobs: Vec<T>, job: impl Fn(T) + Send + Sync) {
-    use rayon::iter::{IntoParallelIterator, ParallelIterator};
-    jobs.into_par_iter().for_each(job);
+/// Wedges, vertices and corners of tets are all numbered with 32 bits.
+fn check_size(vertices: u64, wedges: u64, tets: u64) -> Result<(), CleaveError> {
+    let limit = u64::from(u32::MAX);
+    for (field, found) in [("vertices", vertices), ("wedges", wedges), ("tet corners", 4 * tets)] {
+        if found > limit {
+            return Err(CleaveError::TooLarge { field, limit, found });
+        }
+    }
+    Ok(())
 }
 
-/// Does independent jobs.
-#[cfg(not(feature = "threads"))]
-fn for_each<T>(jobs: Vec<T>, job: impl Fn(T)) {
-    jobs.into_iter().for_each(job);
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn refuses_what_ids_cannot_number() {
+        assert_eq!(check_size(1 << 20, u32::MAX.into(), (1 << 30) - 1), Ok(()));
+        let tets = check_size(1 << 20, u32::MAX.into(), 1 << 30);
+        assert_eq!(tets, Err(CleaveError::TooLarge { field: "tet corners", limit: u32::MAX.into(), found: 1 << 32 }));
+        assert!(check_size(1, 1 << 32, 1).is_err());
+    }
 }

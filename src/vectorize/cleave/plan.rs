@@ -5,8 +5,9 @@
 use super::cells::{CellRow, is_uniform};
 use super::slots::{KUHN_TETS, Owner};
 use super::stencil::StencilTable;
-use super::{CleaveError, for_each};
+use super::{CleaveError, check_size};
 use crate::vectorize::lattice::Lattice;
+use crate::vectorize::parallel::for_each;
 
 /// How many of each a row of lattice vertices holds, or all rows before it.
 #[derive(Debug, Clone, Copy, Default)]
@@ -51,7 +52,7 @@ impl Plan {
             *counts = count_row(&cells, owners, stencils);
         });
         let total = rows.iter().fold(Counts::default(), |sum, &row| sum.add(row));
-        check_size(total)?;
+        check_size(total.vertices, total.wedges, total.tets)?;
         let mut wedges = 0;
         for (owners, counts) in owners.chunks_mut(columns).zip(&rows) {
             for owner in owners {
@@ -85,29 +86,4 @@ fn count_row(cells: &CellRow, owners: &mut [Owner], stencils: &StencilTable) -> 
         };
     }
     counts
-}
-
-/// Wedges, vertices and corners of tets are all numbered with 32 bits.
-fn check_size(total: Counts) -> Result<(), CleaveError> {
-    let limit = u64::from(u32::MAX);
-    for (field, found) in [("vertices", total.vertices), ("wedges", total.wedges), ("tet corners", 4 * total.tets)] {
-        if found > limit {
-            return Err(CleaveError::TooLarge { field, limit, found });
-        }
-    }
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn refuses_what_ids_cannot_number() {
-        let fits = Counts { vertices: 1 << 20, wedges: u64::from(u32::MAX), tets: (1 << 30) - 1 };
-        assert_eq!(check_size(fits), Ok(()));
-        let tets = check_size(Counts { tets: 1 << 30, ..fits });
-        assert_eq!(tets, Err(CleaveError::TooLarge { field: "tet corners", limit: u32::MAX.into(), found: 1 << 32 }));
-        assert!(check_size(Counts { wedges: 1 << 32, ..fits }).is_err());
-    }
 }

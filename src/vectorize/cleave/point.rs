@@ -18,7 +18,7 @@ pub(super) fn inner_point(corners: &[IVec3]) -> IVec3 {
     let count = corners.len() as i32;
     corners.windows(2).zip((1..count).rev()).fold(corners[0], |point, (pair, share)| {
         let step = pair[1] - pair[0];
-        let parts = gcd(gcd(step.x, step.y), step.z);
+        let parts = gcd(gcd(step.x.abs(), step.y.abs()), step.z.abs());
         let taken = (2 * parts * share + count) / (2 * count);
         point + step / parts * taken
     })

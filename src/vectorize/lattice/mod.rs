@@ -1,9 +1,19 @@
-//! The dense lattice over a run of frames (paper §III-B): one vertex a pixel and frame.
+//! The lattice over a run of frames: the dense one of the paper (§III-B), one vertex a pixel and frame, or the adaptive
+//! one ([`AdaptiveLattice`]), which has these vertices only where colour or labels ask for them.
 //!
 //! In: consecutive frames of a slab with a label for every pixel. Out: position, label and colour of every lattice
-//! vertex, computed on demand. Forbidden here: topology; which tets join the vertices is cleaving's business.
+//! vertex; of the dense lattice computed on demand, of the adaptive one with the tets that join them. Forbidden here:
+//! splitting tets between labels, which is cleaving's business.
+
+mod adaptive;
+mod axis;
+mod bisect;
+mod importance;
+mod samples;
 
 use std::sync::Arc;
+
+pub use adaptive::{AdaptiveLattice, TetLattice};
 
 use glam::IVec3;
 use thiserror::Error;
@@ -21,8 +31,10 @@ pub const MAX_SUBPIXEL_BITS: u8 = 6;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum LatticeError {
     /// Positions would be too coarse to cut or too fine to be exact.
-    #[error("subpixel bits: expected {MIN_SUBPIXEL_BITS} to {MAX_SUBPIXEL_BITS}, found {found}")]
+    #[error("subpixel bits: expected {least} to {MAX_SUBPIXEL_BITS}, found {found}")]
     SubpixelBits {
+        /// Fewest that would do.
+        least: u8,
         /// The domain's value.
         found: u8,
     },
@@ -81,25 +93,7 @@ impl<'a> Lattice<'a> {
         frames: &'a [Arc<Frame>],
         labels: &'a [LabelPlane],
     ) -> Result<Self, LatticeError> {
-        if !(MIN_SUBPIXEL_BITS..=MAX_SUBPIXEL_BITS).contains(&domain.subpixel_bits) {
-            return Err(LatticeError::SubpixelBits { found: domain.subpixel_bits });
-        }
-        if frames.len() < 2 || frames.len() != labels.len() {
-            return Err(LatticeError::PlaneCount { frames: frames.len(), labels: labels.len() });
-        }
-        let expected = (domain.width, domain.height);
-        for (plane, (frame, label)) in frames.iter().zip(labels).enumerate() {
-            for found in [(frame.width(), frame.height()), (label.width(), label.height())] {
-                if found != expected {
-                    return Err(LatticeError::PlaneSize { plane, expected, found });
-                }
-            }
-        }
-        let expected = u64::from(domain.duration).min((i32::MAX >> domain.subpixel_bits) as u64);
-        let found = u64::from(first) + frames.len() as u64 - 1;
-        if found > expected {
-            return Err(LatticeError::LastPlane { expected, found });
-        }
+        check(domain, MIN_SUBPIXEL_BITS, first, frames, labels)?;
         Ok(Self { domain, first, frames, labels })
     }
 
@@ -149,6 +143,33 @@ impl<'a> Lattice<'a> {
     fn pixel_row(&self, row: usize) -> usize {
         row.min(self.domain.height as usize - 1)
     }
+}
+
+/// Checks that planes fit each other and the slab.
+fn check(
+    domain: Domain,
+    least_bits: u8,
+    first: u32,
+    frames: &[Arc<Frame>],
+    labels: &[LabelPlane],
+) -> Result<(), LatticeError> {
+    if !(least_bits..=MAX_SUBPIXEL_BITS).contains(&domain.subpixel_bits) {
+        return Err(LatticeError::SubpixelBits { least: least_bits, found: domain.subpixel_bits });
+    }
+    if frames.len() < 2 || frames.len() != labels.len() {
+        return Err(LatticeError::PlaneCount { frames: frames.len(), labels: labels.len() });
+    }
+    let expected = (domain.width, domain.height);
+    for (plane, (frame, label)) in frames.iter().zip(labels).enumerate() {
+        for found in [(frame.width(), frame.height()), (label.width(), label.height())] {
+            if found != expected {
+                return Err(LatticeError::PlaneSize { plane, expected, found });
+            }
+        }
+    }
+    let expected = u64::from(domain.duration).min((i32::MAX >> domain.subpixel_bits) as u64);
+    let found = u64::from(first) + frames.len() as u64 - 1;
+    if found > expected { Err(LatticeError::LastPlane { expected, found }) } else { Ok(()) }
 }
 
 /// Coordinate of lattice line `index` of `count` over `side` pixels: the sample's centre, the outermost at the sides.
@@ -202,7 +223,7 @@ mod tests {
         assert_eq!(refusal(domain(2, 2, 2), 0, 3, 3), Some(size));
         for found in [1, 7] {
             let coarse = Domain { subpixel_bits: found, ..fits };
-            assert_eq!(refusal(coarse, 0, 3, 3), Some(LatticeError::SubpixelBits { found }));
+            assert_eq!(refusal(coarse, 0, 3, 3), Some(LatticeError::SubpixelBits { least: MIN_SUBPIXEL_BITS, found }));
         }
     }
 }

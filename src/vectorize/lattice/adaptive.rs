@@ -1,0 +1,196 @@
+//! The adaptive lattice: newest-vertex bisection of coarse cells, refined where colour or labels ask for it, straight
+//! from the pixels. The dense lattice is never built.
+//!
+//! In: layers of frames, each starting with the last one's last plane. Out: a [`TetLattice`] a layer, one layer late:
+//! what the next layer needs in the plane they share must be known first. Layers, cells and tets conform.
+
+use std::sync::Arc;
+
+use glam::{IVec3, Vec3};
+
+use super::axis::{Axis, CELL};
+use super::bisect::{Bisection, Leaves};
+use super::importance::Importance;
+use super::samples::{Grid, LEVELS, pyramid};
+use super::{LatticeError, check};
+use crate::mesh::Domain;
+use crate::vectorize::parallel::map;
+use crate::video::{Frame, Label, LabelPlane};
+
+/// Tets over vertices of a lattice, before labels split them.
+#[derive(Debug, Clone)]
+pub struct TetLattice {
+    /// The slab's box, of which the lattice covers a run of frames.
+    pub domain: Domain,
+    /// Of the vertices, in lattice units, t since the slab's first frame; ascending by (t, y, x).
+    pub positions: Vec<IVec3>,
+    /// Of the vertices.
+    pub labels: Vec<Label>,
+    /// Of the vertices, in 8-bit levels: of the pixel there, or smoothed over as much as the tets around span.
+    pub colors: Vec<Vec3>,
+    /// Corners of the tets, all of positive volume. Mixed ones have corners next to each other, as in the dense
+    /// lattice.
+    pub tets: Vec<[u32; 4]>,
+}
+
+/// Builds lattices layer by layer.
+#[derive(Debug)]
+pub struct AdaptiveLattice {
+    domain: Domain,
+    vertices_per_pixel: f64,
+    waiting: Option<Layer>,
+}
+
+/// A layer that waits for the next one.
+#[derive(Debug)]
+struct Layer {
+    axes: [Axis; 3],
+    pyramid: [Grid; LEVELS],
+    /// Labels along x for each (t, y); a single label where all is one.
+    labels: LayerLabels,
+    importance: Importance,
+}
+
+#[derive(Debug)]
+enum LayerLabels {
+    Uniform(Label),
+    Rows(Vec<Vec<Label>>),
+}
+
+impl AdaptiveLattice {
+    /// Most frame steps of a layer.
+    pub const MAX_STEPS: u32 = CELL as u32;
+    /// Fewest frame steps of a layer, and fewest pixels of a picture's side, where labels are to be cut: below, lines lie
+    /// too close for the points between.
+    pub const MIN_CUT: u32 = 5;
+    /// Fewest binary digits after the point.
+    pub const MIN_SUBPIXEL_BITS: u8 = 3;
+
+    /// Lattices in the slab that `domain` describes, of about `vertices_per_pixel` vertices a pixel and frame beside those
+    /// that labels need.
+    pub fn new(domain: Domain, vertices_per_pixel: f64) -> Self {
+        Self { domain, vertices_per_pixel, waiting: None }
+    }
+
+    /// Takes the next layer, whose first plane, frame number `first` of the slab, is the last of the one before; gives the
+    /// lattice of that one.
+    ///
+    /// # Errors
+    /// As [`super::Lattice::try_new`]; a layer of more than [`Self::MAX_STEPS`] steps counts as too many planes.
+    pub fn push(
+        &mut self,
+        first: u32,
+        frames: &[Arc<Frame>],
+        labels: &[LabelPlane],
+    ) -> Result<Option<TetLattice>, LatticeError> {
+        check(self.domain, Self::MIN_SUBPIXEL_BITS, first, frames, labels)?;
+        if frames.len() > Self::MAX_STEPS as usize + 1 {
+            return Err(LatticeError::PlaneCount { frames: frames.len(), labels: labels.len() });
+        }
+        let mut layer = self.layer(first, frames, labels);
+        let done = self.waiting.take().map(|mut before| {
+            before.importance.join(&mut layer.importance);
+            before.importance.saturate();
+            before.lattice(self.domain)
+        });
+        self.waiting = Some(layer);
+        Ok(done)
+    }
+
+    /// The lattice of the last layer, if there is one.
+    pub fn finish(&mut self) -> Option<TetLattice> {
+        let mut layer = self.waiting.take()?;
+        layer.importance.saturate();
+        Some(layer.lattice(self.domain))
+    }
+
+    fn layer(&self, first: u32, frames: &[Arc<Frame>], labels: &[LabelPlane]) -> Layer {
+        let unit = self.domain.unit();
+        let axes = [
+            Axis::of_pixels(self.domain.width, unit),
+            Axis::of_pixels(self.domain.height, unit),
+            Axis::of_planes(first, frames.len(), unit),
+        ];
+        let pyramid = pyramid(&axes, frames);
+        let mut importance = Importance::of_colors(&axes, &pyramid);
+        importance.saturate();
+        let pixels = f64::from(self.domain.width) * f64::from(self.domain.height) * (frames.len() - 1) as f64;
+        let threshold = importance.threshold((self.vertices_per_pixel * pixels) as usize);
+        importance.normalize(threshold);
+        let labels = LayerLabels::new(&axes, labels);
+        if let LayerLabels::Rows(rows) = &labels {
+            importance.need_labels(rows);
+            importance.saturate();
+        }
+        Layer { axes, pyramid, labels, importance }
+    }
+}
+
+impl LayerLabels {
+    fn new(axes: &[Axis; 3], planes: &[LabelPlane]) -> Self {
+        let first = planes[0].labels()[0];
+        if planes.iter().all(|plane| plane.labels().iter().all(|&label| label == first)) {
+            return Self::Uniform(first);
+        }
+        let [columns, lines, times] = axes.each_ref().map(Axis::lines);
+        let row = |n: usize| {
+            let (plane, line) = (&planes[times[n / lines.len()].low], lines[n % lines.len()].low);
+            let start = line * plane.width() as usize;
+            columns.iter().map(|column| plane.labels()[start + column.low]).collect()
+        };
+        Self::Rows(map((0..lines.len() * times.len()).collect(), row))
+    }
+}
+
+impl Layer {
+    /// The tets whose vertices are important enough, with what is known at their corners.
+    fn lattice(&self, domain: Domain) -> TetLattice {
+        let leaves = self.leaves();
+        let size = self.importance.size();
+        const ABSENT: u8 = u8::MAX;
+        let mut levels = vec![ABSENT; size.iter().product()];
+        for part in &leaves {
+            for (tet, &level) in part.tets.iter().zip(&part.levels) {
+                for &v in tet {
+                    levels[v as usize] = levels[v as usize].min(level);
+                }
+            }
+        }
+        let mut lattice = TetLattice {
+            domain,
+            positions: Vec::new(),
+            labels: Vec::new(),
+            colors: Vec::new(),
+            tets: Vec::with_capacity(leaves.iter().map(|part| part.tets.len()).sum()),
+        };
+        let mut numbers = vec![0; levels.len()];
+        for (index, &level) in levels.iter().enumerate().filter(|&(_, &level)| level != ABSENT) {
+            numbers[index] = lattice.positions.len() as u32;
+            let vertex = [index % size[0], index / size[0] % size[1], index / (size[0] * size[1])];
+            lattice.positions.push(IVec3::from_array(std::array::from_fn(|a| self.axes[a].lines()[vertex[a]].place)));
+            lattice.labels.push(match &self.labels {
+                LayerLabels::Uniform(label) => *label,
+                LayerLabels::Rows(rows) => rows[index / size[0]][vertex[0]],
+            });
+            let color = self.pyramid[usize::from(level)].at(vertex.map(|n| n >> level));
+            lattice.colors.push(Vec3::from_array(color.map(f32::from)));
+        }
+        for part in leaves {
+            lattice.tets.extend(part.tets.into_iter().map(|tet| tet.map(|v| numbers[v as usize])));
+        }
+        lattice
+    }
+
+    /// Leaves by rows of cells.
+    fn leaves(&self) -> Vec<Leaves> {
+        let size = self.importance.size();
+        let is_wanted = |vertex: [usize; 3]| self.importance.at(vertex) > 1.0;
+        let cells = |steps: usize| (0..steps - 1).step_by(CELL);
+        let rows = cells(size[2]).flat_map(|z| cells(size[1]).map(move |y| (y, z))).collect();
+        map(rows, |(y, z)| {
+            let mut bisection = Bisection::new(size, &is_wanted);
+            cells(size[0]).for_each(|x| bisection.add_cell([x, y, z]));
+            bisection.finish()
+        })
+    }
+}
