@@ -10,8 +10,8 @@ use tetvec::mesh::{Domain, TetMesh, validate, volume6};
 use tetvec::vectorize::cleave::cleave;
 use tetvec::vectorize::lattice::Lattice;
 use tetvec::vectorize::simplify::{
-    ColorQuadric, DistanceQuadric, Goal, Refusal, SimplifyParams, SimplifyReport, Topology, Unfrozen, WedgeQuadric,
-    WorkMesh, simplify,
+    BlockGoal, ColorQuadric, DistanceQuadric, Goal, Refusal, SimplifyParams, SimplifyReport, Topology, Unfrozen,
+    WedgeQuadric, WorkMesh, simplify,
 };
 use tetvec::video::{Label, LabelPlane};
 
@@ -58,7 +58,7 @@ impl Clip {
 
     fn simplified<Q: WedgeQuadric>(&self, vertices: usize, params: &SimplifyParams) -> (TetMesh, SimplifyReport) {
         let mut work = WorkMesh::<Q>::new(self.domain);
-        work.append(&self.whole(), params.surface_weight);
+        work.append(&self.whole(), params);
         let report = simplify(&mut work, ALL, goal(vertices), params);
         let mut mesh = TetMesh::empty(self.domain);
         work.commit(i32::MAX, &mut mesh);
@@ -150,7 +150,7 @@ fn a_flat_surface_stays_flat() {
 fn frozen_vertices_stay() {
     let clip = Clip::new([8, 8, 9], textured, |x, y, _| u32::from(x > y));
     let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
-    work.append(&clip.whole(), 100.0);
+    work.append(&clip.whole(), &SimplifyParams { surface_weight: 100.0, ..SimplifyParams::default() });
     let unfrozen = Unfrozen { low: 2 * 8, high: 6 * 8 };
     let params = SimplifyParams::default();
     let report = simplify(&mut work, unfrozen, goal(0), &params);
@@ -177,7 +177,7 @@ fn windows_join_into_one_tiling() {
     let mut mesh = TetMesh::empty(clip.domain);
     let mut low = -1;
     for (first, last) in [(0, 4), (4, 8), (8, 12)] {
-        work.append(&clip.run(first, last), params.surface_weight);
+        work.append(&clip.run(first, last), &params);
         let end = last == 12;
         let high = if end { i32::MAX } else { (last as i32 - 1) * 8 };
         simplify(&mut work, Unfrozen { low, high }, goal(60), &params);
@@ -198,7 +198,7 @@ fn stops_at_the_error() {
     let clip = Clip::new([10, 10, 6], textured, |_, _, _| 0);
     let params = SimplifyParams::default();
     let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
-    work.append(&clip.whole(), params.surface_weight);
+    work.append(&clip.whole(), &params);
     let report = simplify(&mut work, ALL, Goal { max_cost: 50.0, ..goal(0) }, &params);
     assert!(report.max_cost <= 50.0 * 1.05, "a bucket is 1/16 octave wide, found {}", report.max_cost);
     let further = simplify(&mut work, ALL, Goal { max_cost: 5000.0, ..goal(0) }, &params);
@@ -213,6 +213,54 @@ fn refusals_have_names() {
     for refusal in [Refusal::Sides, Refusal::Labels, Refusal::Flip] {
         assert!(report.refusals.count(refusal) > 0, "{refusal:?} in {report:?}");
     }
+}
+
+#[test]
+fn blocks_join_into_one_tiling() {
+    let clip = Clip::new([24, 15, 11], textured, |x, y, t| u32::from((x + t) / 6 > y / 3) + (x + y) / 20);
+    let params = SimplifyParams { block_vertices: 400, ..SimplifyParams::default() };
+    let simplified = || {
+        let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
+        let goal = BlockGoal { keep: 0.5, max_error: f32::INFINITY };
+        let mut collapses = 0;
+        for (first, last) in [(0, 4), (4, 7), (7, 10)] {
+            let run = clip.run(first, last);
+            let report = work.append_simplified(&run, goal, &params);
+            assert!(report.collapses > run.positions.len() as u64 / 8, "{report:?}");
+            collapses += report.collapses;
+        }
+        let before = work.vertex_count();
+        let report = work.simplify_blocks(ALL, goal, &params);
+        assert_eq!(work.vertex_count() as u64, before as u64 - report.collapses);
+        assert!(work.vertex_count() < 2 * before / 3, "{before}: {report:?}");
+        let last = simplify(&mut work, ALL, self::goal(100), &params);
+        assert_eq!(last.vertices, 100);
+        let mut mesh = TetMesh::empty(clip.domain);
+        work.commit(i32::MAX, &mut mesh);
+        let vertices = clip.whole().positions.len() as u64;
+        assert_eq!(collapses + report.collapses + last.collapses + 100, vertices, "every vertex is accounted for");
+        mesh
+    };
+    let mesh = simplified();
+    assert_eq!(validate(&mesh), Ok(()));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(pool.install(simplified), mesh, "with any number of threads");
+}
+
+#[test]
+fn blocks_leave_frozen_vertices() {
+    let clip = Clip::new([24, 15, 9], textured, |_, _, _| 0);
+    let params = SimplifyParams { block_vertices: 400, ..SimplifyParams::default() };
+    let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
+    work.append(&clip.whole(), &params);
+    let unfrozen = Unfrozen { low: 2 * 8, high: 6 * 8 };
+    work.simplify_blocks(unfrozen, BlockGoal { keep: 0.1, max_error: f32::INFINITY }, &params);
+    let mut mesh = TetMesh::empty(clip.domain);
+    work.commit(i32::MAX, &mut mesh);
+    assert_eq!(validate(&mesh), Ok(()));
+    let outside =
+        |mesh: &TetMesh| mesh.positions.iter().filter(|p| p.z <= unfrozen.low || p.z >= unfrozen.high).count();
+    assert_eq!(outside(&mesh), outside(&clip.whole()));
 }
 
 #[test]

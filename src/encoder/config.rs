@@ -218,7 +218,8 @@ impl EncoderConfig {
 
     /// Vertices a pixel that an adaptive lattice starts with.
     pub(super) fn lattice_ratio(&self) -> f64 {
-        (self.simplification_ratio * self.lattice_density).min(1.0)
+        let wanted = if self.target_error > 0.0 { STEERED_RATIO } else { self.simplification_ratio };
+        (wanted * self.lattice_density).min(1.0)
     }
 
     /// Frames whose mesh decoders accept, with room for the plane that joins the next slab.
@@ -245,6 +246,8 @@ impl EncoderConfig {
 
 /// Tets a vertex of a simplified mesh, with a margin: 5 to 6.5 on natural clips.
 const TETS_A_VERTEX: f64 = 7.0;
+/// Vertices a pixel that may be needed where the error decides: more than streams are made of that anyone watches.
+const STEERED_RATIO: f64 = 0.02;
 /// Positions are rounded to 1/8 px and 1/8 frame: costs 0.1 dB (docs/benchmarks.md).
 const SUBPIXEL_BITS: u8 = 3;
 /// Colours are rounded to 2 levels, in sixteenths of a level.

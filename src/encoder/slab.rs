@@ -10,11 +10,21 @@ use crate::bitstream::{Packet, RINGS, SlabWriter};
 use crate::mesh::{Domain, StarTable, TetMesh};
 use crate::vectorize::fit::{FitParams, FitRequest, fit};
 use crate::vectorize::lattice::AdaptiveLattice;
-use crate::vectorize::simplify::{Goal, SimplifyParams, Unfrozen, WedgeQuadric, WorkMesh, simplify};
+use crate::vectorize::simplify::{BlockGoal, Goal, SimplifyParams, Unfrozen, WedgeQuadric, WorkMesh, simplify};
 use crate::video::{Frame, LabelPlane, Volume};
 
 /// Vertices a pixel of one frame that the transition from the sparse window to its dense leading layer may have.
-const TRANSITION_RATIO: f64 = 0.5;
+const TRANSITION_RATIO: f64 = 0.1;
+
+/// Vertices that blocks of a run are simplified to, over those that the simplification ratio allows: the rest is left to
+/// the window, where they compete with all others.
+const RUN_RATIO: f64 = 2.0;
+
+/// The same for blocks of the window.
+const WINDOW_RATIO: f64 = 1.25;
+
+/// The part of the error allowed that blocks of a run may make, where the error decides.
+const RUN_ERROR: f32 = 0.25;
 
 /// Cost of the last collapse times vertices a pixel, over the squared mean absolute error that the fit then reaches:
 /// 140 to 180 on natural clips. Where it starts; each fit corrects it.
@@ -139,13 +149,47 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let runs = self.runs.take_ready(frames.is_some())?;
         let count = runs.len();
         for (n, Run { mesh, last }) in runs.into_iter().enumerate() {
-            self.work.append(&mesh, self.simplify_params.surface_weight);
+            let goal = self.goal_of_run(&mesh, last - self.lead);
+            let report = self.work.append_simplified(&mesh, goal, &self.simplify_params);
+            log::debug!("blocks: {report:?}");
             self.lead = last;
             log::debug!("run up to frame {last}: {} vertices, {} tets", mesh.positions.len(), mesh.tets.len());
             drop(mesh);
             packets.extend(self.step(frames.filter(|_| n + 1 == count))?);
         }
         Ok(packets)
+    }
+
+    /// How far a run's blocks are simplified before they join the window.
+    fn goal_of_run(&self, run: &TetMesh, frames: u32) -> BlockGoal {
+        let pixels = self.pixels() * f64::from(frames);
+        if self.is_steered() {
+            return BlockGoal { keep: 0.0, max_error: RUN_ERROR * self.allowed_error(pixels) };
+        }
+        let keep = RUN_RATIO * self.ratio * pixels / run.positions.len() as f64;
+        BlockGoal { keep: keep.min(1.0), max_error: f32::INFINITY }
+    }
+
+    /// How far the blocks of the window are simplified at the slab's end, where that is worth the trouble.
+    fn goal_of_blocks(&self, goal: &Goal) -> Option<BlockGoal> {
+        let keep = WINDOW_RATIO * goal.vertices as f64 / self.work.vertex_count() as f64;
+        let is_whole = goal.before == i32::MAX && self.frozen < 0 && !self.is_steered();
+        (is_whole && keep < 1.0).then_some(BlockGoal { keep, max_error: f32::INFINITY })
+    }
+
+    /// Whether the error decides, not the ratio.
+    fn is_steered(&self) -> bool {
+        self.target_error > 0.0
+    }
+
+    /// Pixels of a frame.
+    fn pixels(&self) -> f64 {
+        f64::from(self.committed.domain.width) * f64::from(self.committed.domain.height)
+    }
+
+    /// [`Goal::max_error`] that leads to the target error over so many pixels.
+    fn allowed_error(&self, pixels: f64) -> f32 {
+        (self.error_gain * self.target_error.powi(2) * pixels) as f32
     }
 
     /// Simplifies and hands on; with `frames` the slab has ended and has that many.
@@ -155,6 +199,10 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let high = if frames.is_some() { i32::MAX } else { lead * unit };
         let goal = self.goal(frames, lead);
         let unfrozen = Unfrozen { low: self.frozen, high };
+        if let Some(goal) = self.goal_of_blocks(&goal) {
+            let report = self.work.simplify_blocks(unfrozen, goal, &self.simplify_params);
+            log::debug!("blocks of the window: {report:?}");
+        }
         let report = simplify(&mut self.work, unfrozen, goal, &self.simplify_params);
         log::debug!("simplify: {report:?}, {goal:?}");
         self.frozen = match frames {
@@ -169,25 +217,22 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     /// What the next commit will take must have reached the simplification ratio. Between it and the frozen leading
     /// layer, next to which nothing becomes sparse, the same costs hold, and a bound for the window's memory.
     fn goal(&self, frames: Option<u32>, lead: i32) -> Goal {
-        let domain = &self.committed.domain;
-        let pixels = f64::from(domain.width) * f64::from(domain.height);
+        let unit = self.committed.domain.unit();
+        let pixels = self.pixels();
         let handed_on = self.committed.positions.len() - self.work.committed_vertices().len();
         let allowed = |frames: f64| ((self.ratio * frames * pixels).round() as usize).saturating_sub(handed_on);
         let trailing = frames.unwrap_or((lead as u32).saturating_sub(self.kept));
-        let counted = f64::from(trailing) - f64::from(self.frozen.max(0)) / f64::from(domain.unit());
-        let steered = self.target_error > 0.0;
+        let counted = f64::from(trailing) - f64::from(self.frozen.max(0)) / f64::from(unit);
+        let steered = self.is_steered();
         Goal {
             vertices: if steered { 0 } else { allowed(trailing.into()) },
-            before: if frames.is_some() { i32::MAX } else { trailing as i32 * domain.unit() },
+            before: if frames.is_some() { i32::MAX } else { trailing as i32 * unit },
             vertices_in_window: match frames {
-                Some(_) => usize::MAX,
-                None => allowed(lead.into()) + (TRANSITION_RATIO * pixels) as usize,
+                None if !steered => (RUN_RATIO * allowed(lead.into()) as f64 + TRANSITION_RATIO * pixels) as usize,
+                _ => usize::MAX,
             },
             max_cost: f32::MAX,
-            max_error: match steered {
-                true => (self.error_gain * self.target_error.powi(2) * pixels * counted) as f32,
-                false => f32::INFINITY,
-            },
+            max_error: if steered { self.allowed_error(pixels * counted) } else { f32::INFINITY },
         }
     }
 

@@ -27,7 +27,7 @@ const ROOMS: &[Room] = &[
     Room { module: "vectorize::parallel", may_import: &[] },
     Room { module: "vectorize::lattice", may_import: &["mesh", "video", "vectorize::parallel"] },
     Room { module: "vectorize::cleave", may_import: &["mesh", "video", "vectorize::lattice", "vectorize::parallel"] },
-    Room { module: "vectorize::simplify", may_import: &["mesh", "video"] },
+    Room { module: "vectorize::simplify", may_import: &["mesh", "video", "vectorize::parallel"] },
     Room { module: "vectorize::fit", may_import: &["mesh", "video", "render"] },
     Room { module: "encoder", may_import: ALL },
     Room { module: "decoder", may_import: &["bitstream", "render", "mesh", "video"] },

@@ -18,6 +18,13 @@ pub struct Unfrozen {
     pub high: i32,
 }
 
+impl Unfrozen {
+    /// Whether a vertex at this time is frozen.
+    pub(super) fn freezes(&self, t: i32) -> bool {
+        t <= self.low || t >= self.high
+    }
+}
+
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Goal {
@@ -52,6 +59,16 @@ pub struct SimplifyReport {
     pub vertices_in_window: usize,
 }
 
+impl SimplifyReport {
+    /// Adds what another run did; vertices left are not added.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.collapses += other.collapses;
+        self.evaluations += other.evaluations;
+        self.refusals.add(&other.refusals);
+        self.max_cost = self.max_cost.max(other.max_cost);
+    }
+}
+
 /// Where an edge's merged vertex would go, and what it would cost.
 #[derive(Debug, Clone, Copy)]
 struct Proposal {
@@ -61,9 +78,9 @@ struct Proposal {
 
 /// Refusals of one edge before it is put aside until the queue is empty.
 const MOST_ATTEMPTS: u32 = 4;
-/// Buckets by which a refused edge is put back: half an octave of cost.
-const SETBACK: usize = 8;
-/// Log2 of the slots in the table of entries known to be queued already.
+/// Buckets by which a refused edge is put back: an octave of cost.
+const SETBACK: usize = 16;
+/// Most binary digits of a slot's number in the table of entries known to be queued already.
 const KNOWN_BITS: u32 = 18;
 
 struct Simplifier<'a, Q> {
@@ -76,6 +93,7 @@ struct Simplifier<'a, Q> {
     aside: Vec<Entry>,
     alias: Vec<u32>,
     known: Vec<[u32; 3]>,
+    known_bits: u32,
     report: SimplifyReport,
     star: Vec<u32>,
 }
@@ -93,17 +111,16 @@ pub fn simplify<Q: WedgeQuadric>(
         min_shape: params.min_shape.powi(3),
         max_extent: (params.max_extent_frames as i32).saturating_mul(mesh.domain.unit()),
     };
-    let count = |before: i32| {
-        let live = (0..mesh.positions.len()).filter(|&v| mesh.stamps[v] != NONE);
-        live.filter(|&v| mesh.positions[v].z < before).count()
-    };
+    let count =
+        |before: i32| mesh.vertices.iter().filter(|vertex| vertex.stamp != NONE && vertex.position.z < before).count();
+    let known_bits = (mesh.vertices.len() as u32 | 1).ilog2().clamp(4, KNOWN_BITS);
     let report = SimplifyReport {
         vertices: count(goal.before),
         vertices_in_window: count(unfrozen.high),
         ..SimplifyReport::default()
     };
     let mut run = Simplifier {
-        alias: (0..mesh.positions.len() as u32).collect(),
+        alias: (0..mesh.vertices.len() as u32).collect(),
         mesh,
         unfrozen,
         goal,
@@ -111,7 +128,8 @@ pub fn simplify<Q: WedgeQuadric>(
         limits,
         queue: BucketQueue::new(),
         aside: Vec::new(),
-        known: vec![[NONE; 3]; 1 << KNOWN_BITS],
+        known: vec![[NONE; 3]; 1 << known_bits],
+        known_bits,
         report,
         star: Vec::new(),
     };
@@ -124,7 +142,7 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
     /// Fills the queue with every edge that has an end which may move.
     fn rank_edges(&mut self) {
         const CHUNK: usize = 4096;
-        let vertices = self.mesh.positions.len();
+        let vertices = self.mesh.vertices.len();
         let chunks: Vec<std::ops::Range<usize>> =
             (0..vertices).step_by(CHUNK).map(|start| start..(start + CHUNK).min(vertices)).collect();
         // In groups, so that the ranked edges of a group, not of the whole mesh, wait beside the queue.
@@ -166,7 +184,7 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
                 evaluations += 1;
                 match self.propose(u, v) {
                     Ok(proposal) => {
-                        let stamp = self.mesh.stamps[u as usize].wrapping_add(self.mesh.stamps[v as usize]);
+                        let stamp = self.mesh.stamp(u, v);
                         ranked.push((BucketQueue::bucket(proposal.cost), Entry { u, v, stamp, attempts: 0 }));
                     }
                     Err(refusal) => refusals.note(refusal),
@@ -199,35 +217,37 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
             if bucket > limit || error > self.goal.max_error {
                 return;
             }
-            if let Some(entry) = self.renew(bucket, entry) {
-                self.try_collapse(bucket, entry);
+            if let Some((entry, proposal)) = self.renew(bucket, entry) {
+                self.try_collapse(bucket, entry, proposal);
             }
         }
     }
 
-    /// The entry, if its cost is current and its turn has come; an outdated one is renewed and put back.
-    fn renew(&mut self, bucket: usize, entry: Entry) -> Option<Entry> {
+    /// The entry and where its collapse would lead, if its cost is current and its turn has come; an outdated one is
+    /// renewed and put back.
+    fn renew(&mut self, bucket: usize, entry: Entry) -> Option<(Entry, Proposal)> {
         let (u, v) = (self.root(entry.u), self.root(entry.v));
         if u == v {
             return None;
         }
-        let stamp = self.mesh.stamps[u as usize].wrapping_add(self.mesh.stamps[v as usize]);
-        if [u, v, stamp] == [entry.u, entry.v, entry.stamp] {
-            return Some(entry);
-        }
+        let stamp = self.mesh.stamp(u, v);
+        let is_current = [u, v, stamp] == [entry.u, entry.v, entry.stamp];
         let (u, v) = (u.min(v), u.max(v));
-        let slot = (u.wrapping_mul(0x9e37_79b1) ^ v.wrapping_mul(0x85eb_ca6b)) >> (32 - KNOWN_BITS);
-        if self.known[slot as usize] == [u, v, stamp] {
-            return None;
+        if !is_current {
+            let slot = (u.wrapping_mul(0x9e37_79b1) ^ v.wrapping_mul(0x85eb_ca6b)) >> (32 - self.known_bits);
+            if self.known[slot as usize] == [u, v, stamp] {
+                return None;
+            }
+            self.known[slot as usize] = [u, v, stamp];
         }
-        self.known[slot as usize] = [u, v, stamp];
         self.report.evaluations += 1;
         match self.propose(u, v) {
+            Ok(proposal) if is_current => return Some((entry, proposal)),
             Ok(proposal) => {
                 let renewed = Entry { u, v, stamp, attempts: 0 };
                 let due = BucketQueue::bucket(proposal.cost);
                 if due <= bucket {
-                    return Some(renewed);
+                    return Some((renewed, proposal));
                 }
                 self.queue.push(due, renewed);
             }
@@ -236,17 +256,11 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
         None
     }
 
-    fn try_collapse(&mut self, bucket: usize, entry: Entry) {
+    fn try_collapse(&mut self, bucket: usize, entry: Entry, proposal: Proposal) {
         let (u, v) = (entry.u, entry.v);
-        let checked = self.propose(u, v).and_then(|proposal| {
-            if self.params.topology == Topology::Strict {
-                self.mesh.check_link(u, v)?;
-            }
-            self.mesh.check_geometry([u, v], proposal.position, &self.limits)?;
-            Ok(proposal)
-        });
-        match checked {
-            Ok(proposal) => self.perform(u, v, proposal),
+        let link = if self.params.topology == Topology::Strict { self.mesh.check_link(u, v) } else { Ok(()) };
+        match link.and_then(|()| self.mesh.check_geometry([u, v], proposal.position, &self.limits)) {
+            Ok(()) => self.perform(u, v, proposal),
             Err(refusal) => {
                 self.report.refusals.note(refusal);
                 let entry = Entry { attempts: entry.attempts + 1, ..entry };
@@ -269,8 +283,8 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
     }
 
     fn is_frozen(&self, v: u32) -> bool {
-        let t = self.mesh.positions[v as usize].z;
-        t <= self.unfrozen.low || t >= self.unfrozen.high
+        let vertex = &self.mesh.vertices[v as usize];
+        vertex.frozen || self.unfrozen.freezes(vertex.position.z)
     }
 
     /// Position and cost of merging `u` and `v`; costs nothing but arithmetic on the two.
@@ -280,21 +294,21 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
         if fixed_u && fixed_v {
             return Err(Refusal::Frozen);
         }
-        let (sides_u, sides_v) = (mesh.sides[u as usize], mesh.sides[v as usize]);
+        let (sides_u, sides_v) = (mesh.vertices[u as usize].sides, mesh.vertices[v as usize].sides);
         let sides = sides_u.or(sides_v);
         if sides != sides_u && sides != sides_v {
             return Err(Refusal::Sides);
         }
         // The frozen end, else the one of higher category, keeps its place in the axes in which it is bound.
         let bound = if fixed_u || (!fixed_v && sides_u == sides) { u } else { v };
-        if mesh.sides[bound as usize] != sides {
+        if mesh.vertices[bound as usize].sides != sides {
             return Err(Refusal::Sides);
         }
         if self.params.topology == Topology::Strict {
             mesh.check_labels(u, v)?;
         }
         let total = self.merged_quadric(u, v, bound);
-        let origin = mesh.positions[bound as usize];
+        let origin = mesh.vertices[bound as usize].position;
         if fixed_u || fixed_v || self.keeps_place(u, v, bound) {
             return Ok(Proposal { position: origin, cost: total.at(Vec3::ZERO) });
         }
@@ -313,7 +327,7 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
     fn merged_quadric(&self, u: u32, v: u32, origin: u32) -> PositionQuadric {
         let mesh = &*self.mesh;
         let other = if origin == u { v } else { u };
-        let shift = mesh.offset(mesh.positions[other as usize], mesh.positions[origin as usize]);
+        let shift = mesh.offset(mesh.vertices[other as usize].position, mesh.vertices[origin as usize].position);
         let mut total = PositionQuadric::default();
         for wedge in mesh.wedges(origin) {
             let mut quadric = wedge.quadric;
@@ -325,16 +339,12 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
         for wedge in mesh.wedges(other).filter(|wedge| mesh.wedge(origin, wedge.label).is_none()) {
             total.add_scaled(&wedge.quadric.recentered(shift).reduced(), 1.0);
         }
-        if let Some(surface) = mesh.surfaces.get(mesh.surface[origin as usize] as usize) {
+        if let Some(surface) = mesh.surfaces.get(mesh.vertices[origin as usize].surface as usize) {
             total.add_scaled(surface, 1.0);
         }
-        if let Some(surface) = mesh.surfaces.get(mesh.surface[other as usize] as usize) {
+        if let Some(surface) = mesh.surfaces.get(mesh.vertices[other as usize].surface as usize) {
             total.add_scaled(&surface.recentered(shift), 1.0);
         }
-        let mut inherited = mesh.inherited[origin as usize];
-        inherited.add(&mesh.inherited[other as usize].recentered(shift));
-        let spread = PositionQuadric::points(inherited.count, inherited.sum, inherited.squares);
-        total.add_scaled(&spread, self.params.spread_weight);
         total
     }
 
@@ -349,7 +359,7 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
     ) -> Proposal {
         let mesh = &*self.mesh;
         let unit = mesh.domain.unit() as f32;
-        let [a, b] = ends.map(|v| mesh.positions[v as usize]);
+        let [a, b] = ends.map(|v| mesh.vertices[v as usize].position);
         let at = |position: IVec3| Proposal { position, cost: total.at(mesh.offset(origin, position)) };
         let middle = mesh.offset(origin, a).midpoint(mesh.offset(origin, b));
         let reach = 2.0 * mesh.offset(a, b).length();
@@ -380,7 +390,7 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
         let (kept, gone) = if keep_u { (u, v) } else { (v, u) };
         self.report.collapses += 1;
         self.report.max_cost = self.report.max_cost.max(proposal.cost);
-        let times = [gone, kept].map(|w| self.mesh.positions[w as usize].z);
+        let times = [gone, kept].map(|w| self.mesh.vertices[w as usize].position.z);
         let count = |vertices: usize, end: i32| {
             let in_both = times.iter().filter(|&&t| t < end).count();
             vertices + usize::from(proposal.position.z < end) - in_both
@@ -396,43 +406,48 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
 type Ranked = (Vec<(usize, Entry)>, u64, RefusalCounts);
 
 impl<Q: WedgeQuadric> WorkMesh<Q> {
+    /// Changes that the two have seen.
+    fn stamp(&self, u: u32, v: u32) -> u32 {
+        self.vertices[u as usize].stamp.wrapping_add(self.vertices[v as usize].stamp)
+    }
+
     /// Moves `kept` to `position` and gives it the wedges and quadrics of `gone`.
     fn merge_attributes(&mut self, kept: u32, gone: u32, position: IVec3) {
         let (k, g) = (kept as usize, gone as usize);
-        let to_kept = self.offset(self.positions[k], position);
-        let to_gone = self.offset(self.positions[g], position);
-        let mut at = kept;
-        let mut wedge = Some(&mut self.first[at as usize]);
-        while let Some(own) = wedge {
+        let to_kept = self.offset(self.vertices[k].position, position);
+        let to_gone = self.offset(self.vertices[g].position, position);
+        let own = &mut self.vertices[k].first;
+        own.quadric = own.quadric.recentered(to_kept);
+        let mut next = own.next;
+        while let Some(own) = self.overflow.get_mut(next as usize) {
             own.quadric = own.quadric.recentered(to_kept);
-            at = own.next;
-            wedge = self.overflow.get_mut(at as usize);
+            next = own.next;
         }
-        let mut other = Some(self.first[g]);
+        let mut other = Some(self.vertices[g].first);
         while let Some(wedge) = other {
             other = self.overflow.get(wedge.next as usize).copied();
             self.wedge_mut(kept, wedge.label).quadric.add(&wedge.quadric.recentered(to_gone));
         }
-        let mut inherited = self.inherited[k].recentered(to_kept);
-        inherited.add(&self.inherited[g].recentered(to_gone));
-        self.inherited[k] = inherited;
         self.merge_surfaces(k, g, to_kept, to_gone);
-        self.positions[k] = position;
-        self.sides[k] = self.sides[k].or(self.sides[g]);
-        self.stamps[k] += 1;
-        self.stamps[g] = NONE;
+        let gone_sides = self.vertices[g].sides;
+        self.vertices[g].stamp = NONE;
+        let kept = &mut self.vertices[k];
+        kept.position = position;
+        kept.sides = kept.sides.or(gone_sides);
+        kept.stamp += 1;
     }
 
     fn merge_surfaces(&mut self, k: usize, g: usize, to_kept: Vec3, to_gone: Vec3) {
-        let of_gone = self.surfaces.get(self.surface[g] as usize).map(|s| s.recentered(to_gone));
-        if let Some(own) = self.surfaces.get_mut(self.surface[k] as usize) {
+        let of_gone = self.surfaces.get(self.vertices[g].surface as usize).map(|s| s.recentered(to_gone));
+        if let Some(own) = self.surfaces.get_mut(self.vertices[k].surface as usize) {
             *own = own.recentered(to_kept);
             if let Some(other) = of_gone {
                 own.add_scaled(&other, 1.0);
             }
         } else if let Some(other) = of_gone {
-            self.surface[k] = self.surface[g];
-            self.surfaces[self.surface[g] as usize] = other;
+            let surface = self.vertices[g].surface;
+            self.vertices[k].surface = surface;
+            self.surfaces[surface as usize] = other;
         }
     }
 

@@ -17,7 +17,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
             if tet[0] == NONE {
                 continue;
             }
-            if tet.iter().all(|&v| self.positions[v as usize].z <= low) {
+            if tet.iter().all(|&v| self.vertices[v as usize].position.z <= low) {
                 let corners = tet.map(|v| self.commit_wedge(v, label, committed));
                 committed.tets.push(corners);
             } else {
@@ -29,10 +29,11 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     }
 
     fn commit_wedge(&mut self, v: u32, label: crate::video::Label, committed: &mut TetMesh) -> WedgeId {
-        if self.committed[v as usize] == NONE {
-            self.committed[v as usize] = committed.push_vertex(self.positions[v as usize]).0;
+        let number = &mut self.committed[v as usize];
+        if *number == NONE {
+            *number = committed.push_vertex(self.vertices[v as usize].position).0;
         }
-        let vertex = VertexId(self.committed[v as usize]);
+        let vertex = VertexId(*number);
         let wedge = self.wedge_mut(v, label);
         if wedge.committed == NONE {
             let color = wedge.quadric.color_at(Vec3::ZERO);
@@ -43,7 +44,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
 
     /// Drops vertices without tets and renumbers the others in their order.
     fn pack(&mut self) {
-        let mut number = vec![NONE; self.positions.len()];
+        let mut number = vec![NONE; self.vertices.len()];
         for &v in self.tets.as_flattened() {
             number[v as usize] = 0;
         }
@@ -54,34 +55,33 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
             *v = number[*v as usize];
         }
         self.pack_overflow(&number);
-        retain_numbered(&mut self.positions, &number);
-        retain_numbered(&mut self.sides, &number);
-        retain_numbered(&mut self.stamps, &number);
+        retain_numbered(&mut self.vertices, &number);
         retain_numbered(&mut self.committed, &number);
-        retain_numbered(&mut self.inherited, &number);
-        retain_numbered(&mut self.surface, &number);
-        retain_numbered(&mut self.first, &number);
-        self.stars = Stars::new(self.positions.len(), &self.tets);
+        self.stars = Stars::new(self.vertices.len(), &self.tets);
     }
 
     fn pack_overflow(&mut self, number: &[u32]) {
         let old_overflow = std::mem::take(&mut self.overflow);
         let old_surfaces = std::mem::take(&mut self.surfaces);
         for v in (0..number.len()).filter(|&v| number[v] != NONE) {
-            let mut next = self.first[v].next;
-            self.first[v].next = NONE;
+            let mut next = self.vertices[v].first.next;
+            self.vertices[v].first.next = NONE;
             let mut tail = NONE;
             while next != NONE {
                 let wedge = old_overflow[next as usize];
                 next = wedge.next;
                 let at = self.overflow.len() as u32;
                 self.overflow.push(super::work_mesh::WorkWedge { next: NONE, ..wedge });
-                let link = if tail == NONE { &mut self.first[v].next } else { &mut self.overflow[tail as usize].next };
+                let link = if tail == NONE {
+                    &mut self.vertices[v].first.next
+                } else {
+                    &mut self.overflow[tail as usize].next
+                };
                 *link = at;
                 tail = at;
             }
-            if let Some(&surface) = old_surfaces.get(self.surface[v] as usize) {
-                self.surface[v] = self.surfaces.len() as u32;
+            if let Some(&surface) = old_surfaces.get(self.vertices[v].surface as usize) {
+                self.vertices[v].surface = self.surfaces.len() as u32;
                 self.surfaces.push(surface);
             }
         }

@@ -65,12 +65,14 @@ pub enum Topology {
     Strict,
 }
 
+#[inline]
 fn volume6_of([a, b, c, d]: [IVec3; 4]) -> i64 {
     volume6(a, b, c, d)
 }
 
 /// The cube of a tet's mean ratio, 12 (3 V)^(2/3) over the sum of its squared edges: 1 for a regular tet, 0 for a flat
 /// one. Liu and Joe, "Relationship between tetrahedron shape measures", 1994.
+#[inline]
 fn shape([a, b, c, d]: [IVec3; 4], volume6: i64) -> f32 {
     let squared = |p: IVec3, q: IVec3| (q - p).as_vec3().length_squared();
     let edges = squared(a, b) + squared(a, c) + squared(a, d) + squared(b, c) + squared(b, d) + squared(c, d);
@@ -95,7 +97,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     /// Positivity suffices for a tiling: the sum of signed volumes is kept, so positive tets cover each point once.
     pub(super) fn check_geometry(&self, [u, v]: [u32; 2], position: IVec3, limits: &Limits) -> Result<(), Refusal> {
         for (moved, other) in [(u, v), (v, u)] {
-            if self.positions[moved as usize] == position {
+            if self.vertices[moved as usize].position == position {
                 // Only tets that move can turn over, but a vertex that stays can still gain long ones from `other`.
                 continue;
             }
@@ -104,7 +106,9 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
                 if corners.contains(&other) {
                     continue;
                 }
-                let moved_corners = corners.map(|w| if w == moved { position } else { self.positions[w as usize] });
+                // Written out: this is where the loop spends its time, and a closure here is not inlined.
+                let at = |n: usize| if corners[n] == moved { position } else { self.place(corners[n]) };
+                let moved_corners = [at(0), at(1), at(2), at(3)];
                 let volume = volume6_of(moved_corners);
                 if volume <= 0 {
                     return Err(Refusal::Flip);
@@ -112,7 +116,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
                 let shape = shape(moved_corners, volume);
                 if volume < limits.min_volume6 || shape < limits.min_shape {
                     // A tet that was worse before is no reason to refuse what makes it better.
-                    let now = corners.map(|w| self.positions[w as usize]);
+                    let now = corners.map(|w| self.place(w));
                     let volume_now = volume6_of(now);
                     if volume < limits.min_volume6 && volume < volume_now {
                         return Err(Refusal::Flip);
@@ -121,9 +125,8 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
                         return Err(Refusal::Sliver);
                     }
                 }
-                let reaches =
-                    |&w: &u32| w != moved && (self.positions[w as usize].z - position.z).abs() > limits.max_extent;
-                if corners.iter().any(reaches) {
+                let times = moved_corners.map(|p| (p.z - position.z).abs());
+                if times[0].max(times[1]).max(times[2]).max(times[3]) > limits.max_extent {
                     return Err(Refusal::Extent);
                 }
             }
@@ -131,14 +134,19 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         Ok(())
     }
 
+    #[inline(always)]
+    fn place(&self, vertex: u32) -> IVec3 {
+        self.vertices[vertex as usize].position
+    }
+
     /// The label rule of [`Topology::Strict`]: one end's labels and sides include the other's, and an edge between two
     /// boundary vertices runs along the boundary.
     pub(super) fn check_labels(&self, u: u32, v: u32) -> Result<(), Refusal> {
         let includes = |a: u32, b: u32| {
-            self.sides[a as usize].contains(self.sides[b as usize])
+            self.vertices[a as usize].sides.contains(self.vertices[b as usize].sides)
                 && self.wedges(b).all(|wedge| self.wedge(a, wedge.label).is_some())
         };
-        let class = |v: u32| self.wedges(v).count() as u32 + self.sides[v as usize].count();
+        let class = |v: u32| self.wedges(v).count() as u32 + self.vertices[v as usize].sides.count();
         let (lower, upper) = if class(u) <= class(v) { (u, v) } else { (v, u) };
         if !includes(upper, lower) {
             return Err(Refusal::Labels);

@@ -1,9 +1,10 @@
 //! Simplification of the window's mesh by edge collapse (§IV-A): extended quadric error metrics with a uniformity
 //! term, one colour per label at boundary vertices, categories of vertices, named refusals.
 //!
-//! In: runs of dense lattice ([`WorkMesh::append`]). Out: a sparse mesh that tiles the same box
+//! In: runs of lattice ([`WorkMesh::append`], [`WorkMesh::append_simplified`]). Out: a sparse mesh that tiles the same box
 //! ([`WorkMesh::commit`]). Forbidden here: pixels, coding, deciding how long the window is.
 
+mod blocks;
 mod collapse;
 mod commit;
 mod legality;
@@ -12,6 +13,7 @@ mod queue;
 mod stars;
 mod work_mesh;
 
+pub use blocks::BlockGoal;
 pub use collapse::{Goal, SimplifyReport, Unfrozen, simplify};
 pub use legality::{Refusal, RefusalCounts, Topology};
 pub use quadric::{ColorQuadric, DistanceQuadric, PositionQuadric, TetField, WedgeQuadric};
@@ -33,6 +35,16 @@ pub struct SimplifyParams {
     pub max_extent_frames: u32,
     /// How strictly the topology of labels is kept.
     pub topology: Topology,
+    /// Vertices that a block has which is simplified by itself; at least 1. By default its data fill a core's share of
+    /// the caches.
+    pub block_vertices: usize,
+}
+
+impl SimplifyParams {
+    /// Blocks of a mesh of so many vertices.
+    fn blocks(&self, vertices: usize) -> usize {
+        vertices.div_ceil(self.block_vertices.max(1)).max(1)
+    }
 }
 
 impl Default for SimplifyParams {
@@ -44,6 +56,7 @@ impl Default for SimplifyParams {
             min_shape: 0.03,
             max_extent_frames: 10,
             topology: Topology::Free,
+            block_vertices: 20_000,
         }
     }
 }

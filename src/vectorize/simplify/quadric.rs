@@ -31,6 +31,9 @@ pub struct TetField {
 pub trait WedgeQuadric: Copy + Default + Send + Sync {
     /// The error that one tet contributes to one of its corners.
     fn of_tet(field: &TetField) -> Self;
+    /// `weight` times the squared distance to the origin, whatever the colour: a lattice vertex's part in the uniformity
+    /// term (Eq. 5, 6).
+    fn of_point(weight: f32) -> Self;
     /// Adds `other`, about the same origin.
     fn add(&mut self, other: &Self);
     /// The same quadric about an origin moved by `shift`.
@@ -175,6 +178,10 @@ impl WedgeQuadric for ColorQuadric {
         }
     }
 
+    fn of_point(weight: f32) -> Self {
+        Self { hessian: [weight, 0.0, 0.0, weight, 0.0, weight], ..Self::default() }
+    }
+
     #[inline]
     fn add(&mut self, other: &Self) {
         self.weight += other.weight;
@@ -201,7 +208,7 @@ impl WedgeQuadric for ColorQuadric {
     #[inline]
     fn reduced(&self) -> PositionQuadric {
         if self.weight <= 0.0 {
-            return PositionQuadric::default();
+            return PositionQuadric { a: self.hessian, b: self.linear, c: self.constant };
         }
         let inverse = 1.0 / self.weight;
         let mut a = gram(&self.gradient);
@@ -259,6 +266,10 @@ impl WedgeQuadric for DistanceQuadric {
             linear_color: -w * offset,
             constant: w * field.color.dot(offset),
         }
+    }
+
+    fn of_point(weight: f32) -> Self {
+        Self { position: [weight, 0.0, 0.0, weight, 0.0, weight], ..Self::default() }
     }
 
     #[inline]

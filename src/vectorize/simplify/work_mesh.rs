@@ -1,10 +1,13 @@
 //! The working mesh: what the window holds while edges collapse.
 //!
-//! Flat arrays. Most vertices lie inside one label, so each has room for one wedge in `first`; further ones hang in
-//! `overflow`. A wedge's colour is not stored: it is the one its quadric likes best.
+//! Flat arrays. Most vertices lie inside one label, so each has room for one wedge; further ones hang in `overflow`.
+//! A wedge's colour is not stored: it is the one its quadric likes best.
+
+use std::collections::HashMap;
 
 use glam::{IVec3, Vec3};
 
+use super::SimplifyParams;
 use super::quadric::{PositionQuadric, TetField, WedgeQuadric};
 use super::stars::Stars;
 use crate::mesh::{Domain, FACES, Sides, TetMesh};
@@ -24,55 +27,35 @@ pub(super) struct WorkWedge<Q> {
     pub(super) quadric: Q,
 }
 
-/// The lattice vertices that a vertex has inherited, for the uniformity term (Eq. 5, 6): number, sum and sum of
-/// squares of their offsets in pixels.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Inherited {
-    pub(super) count: f32,
-    pub(super) sum: Vec3,
-    pub(super) squares: f32,
+/// A vertex and what its collapses cost: two cache lines, which is what evaluating an edge waits for.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+pub(super) struct WorkVertex<Q> {
+    /// Its wedge, if it lies inside one label, else the first. The uniformity term (Eq. 5, 6) is part of its quadric.
+    pub(super) first: WorkWedge<Q>,
+    /// In lattice units.
+    pub(super) position: IVec3,
+    /// Counts changes; [`NONE`] where the vertex has merged into another.
+    pub(super) stamp: u32,
+    /// Where the surface quadric is, or [`NONE`].
+    pub(super) surface: u32,
+    pub(super) sides: Sides,
+    /// Whether it waits for neighbours in another part of the mesh.
+    pub(super) frozen: bool,
 }
 
 /// The window's mesh.
 #[derive(Debug)]
 pub struct WorkMesh<Q> {
     pub(super) domain: Domain,
-    pub(super) positions: Vec<IVec3>,
-    pub(super) sides: Vec<Sides>,
-    /// Counts changes of a vertex; [`NONE`] where it has merged into another.
-    pub(super) stamps: Vec<u32>,
-    /// Number in the committed mesh, or [`NONE`].
+    pub(super) vertices: Vec<WorkVertex<Q>>,
+    /// Numbers of the vertices in the committed mesh, or [`NONE`].
     pub(super) committed: Vec<u32>,
-    pub(super) inherited: Vec<Inherited>,
-    /// Where the vertex's surface quadric is, or [`NONE`].
-    pub(super) surface: Vec<u32>,
     pub(super) surfaces: Vec<PositionQuadric>,
-    pub(super) first: Vec<WorkWedge<Q>>,
     pub(super) overflow: Vec<WorkWedge<Q>>,
     pub(super) tets: Vec<[u32; 4]>,
     pub(super) labels: Vec<Label>,
     pub(super) stars: Stars,
-}
-
-impl Inherited {
-    fn one() -> Self {
-        Self { count: 1.0, ..Self::default() }
-    }
-
-    /// The same points seen from an origin moved by `shift`.
-    pub(super) fn recentered(&self, shift: Vec3) -> Self {
-        Self {
-            count: self.count,
-            sum: self.sum - self.count * shift,
-            squares: self.squares - 2.0 * shift.dot(self.sum) + self.count * shift.length_squared(),
-        }
-    }
-
-    pub(super) fn add(&mut self, other: &Self) {
-        self.count += other.count;
-        self.sum += other.sum;
-        self.squares += other.squares;
-    }
 }
 
 impl<Q: WedgeQuadric> WorkMesh<Q> {
@@ -80,19 +63,19 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     pub fn new(domain: Domain) -> Self {
         Self {
             domain,
-            positions: Vec::new(),
-            sides: Vec::new(),
-            stamps: Vec::new(),
+            vertices: Vec::new(),
             committed: Vec::new(),
-            inherited: Vec::new(),
-            surface: Vec::new(),
             surfaces: Vec::new(),
-            first: Vec::new(),
             overflow: Vec::new(),
             tets: Vec::new(),
             labels: Vec::new(),
             stars: Stars::default(),
         }
+    }
+
+    /// Vertices in it.
+    pub fn vertex_count(&self) -> usize {
+        self.vertices.iter().filter(|vertex| vertex.stamp != NONE).count()
     }
 
     /// Numbers, in the committed mesh, of the vertices handed on whose stars are not handed on whole.
@@ -103,66 +86,71 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     /// Sets where the box ends in time, once the slab's end is known.
     pub fn set_duration(&mut self, duration: u32) {
         self.domain.duration = duration;
-        for (sides, &position) in self.sides.iter_mut().zip(&self.positions) {
-            *sides = self.domain.sides(position);
+        for vertex in &mut self.vertices {
+            vertex.sides = self.domain.sides(vertex.position);
         }
     }
 
     /// Appends a run of lattice, glued where its vertices lie on vertices that are there already: the plane at the
-    /// window's leading end. Surfaces between labels count with `surface_weight` (squared levels a squared pixel).
-    pub fn append(&mut self, run: &TetMesh, surface_weight: f32) {
-        let vertices = self.glue_vertices(run);
-        let first_tet = self.tets.len();
+    /// window's leading end.
+    pub fn append(&mut self, run: &TetMesh, params: &SimplifyParams) {
+        let bottom = run.positions.iter().map(|p| p.z).min().unwrap_or(0);
+        let known = self.plane(bottom);
+        let place = |mesh: &mut Self, &position: &IVec3| match known.get(&position) {
+            Some(&vertex) => vertex,
+            None => mesh.push_vertex(position, false),
+        };
+        let first_vertex = self.vertices.len();
+        let vertices: Vec<u32> = run.positions.iter().map(|position| place(self, position)).collect();
+        self.add_tets(run, &vertices);
+        self.spread(first_vertex, params.spread_weight);
+        self.stars = Stars::new(self.vertices.len(), &self.tets);
+        self.add_surfaces(self.tets.len() - run.tets.len(), |_| true, params.surface_weight);
+    }
+
+    /// The vertices at time `t` (lattice units), by position.
+    pub(super) fn plane(&self, t: i32) -> HashMap<IVec3, u32> {
+        let vertices = self.vertices.iter().zip(0..).filter(|(vertex, _)| vertex.position.z == t);
+        vertices.map(|(vertex, number)| (vertex.position, number)).collect()
+    }
+
+    pub(super) fn push_vertex(&mut self, position: IVec3, frozen: bool) -> u32 {
+        self.vertices.push(WorkVertex {
+            first: WorkWedge { label: UNSET, next: NONE, committed: NONE, quadric: Q::default() },
+            position,
+            stamp: 0,
+            surface: NONE,
+            sides: self.domain.sides(position),
+            frozen,
+        });
+        self.committed.push(NONE);
+        self.vertices.len() as u32 - 1
+    }
+
+    /// Adds the tets of `run`, whose vertices are `vertices` here, with their colours' quadrics.
+    pub(super) fn add_tets(&mut self, run: &TetMesh, vertices: &[u32]) {
         for (tet, corners) in run.tets.iter().enumerate() {
             self.tets.push(corners.map(|w| vertices[run.vertex(w).index()]));
             self.labels.push(run.tet_label(tet));
         }
-        self.add_color_quadrics(run, &vertices);
-        self.stars = Stars::new(self.positions.len(), &self.tets);
-        self.add_surfaces(first_tet, surface_weight);
+        self.add_color_quadrics(run, vertices);
     }
 
-    /// Numbers of the run's vertices here.
-    fn glue_vertices(&mut self, run: &TetMesh) -> Vec<u32> {
-        let key = |p: IVec3| (p.z, p.y, p.x);
-        let bottom = run.positions.iter().map(|p| p.z).min().unwrap_or(0);
-        let mut plane: Vec<u32> =
-            (0..self.positions.len() as u32).filter(|&v| self.positions[v as usize].z == bottom).collect();
-        plane.sort_unstable_by_key(|&v| key(self.positions[v as usize]));
-        let mut vertices = Vec::with_capacity(run.positions.len());
-        for &position in &run.positions {
-            let known = if position.z == bottom {
-                plane.binary_search_by_key(&key(position), |&v| key(self.positions[v as usize])).ok()
-            } else {
-                None
-            };
-            vertices.push(match known {
-                Some(at) => plane[at],
-                None => self.push_vertex(position),
-            });
+    /// Gives the vertices from `first` on, other than frozen ones, their part in the uniformity term.
+    pub(super) fn spread(&mut self, first: usize, weight: f32) {
+        for vertex in self.vertices[first..].iter_mut().filter(|vertex| !vertex.frozen) {
+            vertex.first.quadric.add(&Q::of_point(weight));
         }
-        vertices
-    }
-
-    fn push_vertex(&mut self, position: IVec3) -> u32 {
-        self.positions.push(position);
-        self.sides.push(self.domain.sides(position));
-        self.stamps.push(0);
-        self.committed.push(NONE);
-        self.inherited.push(Inherited::one());
-        self.surface.push(NONE);
-        self.first.push(WorkWedge { label: UNSET, next: NONE, committed: NONE, quadric: Q::default() });
-        self.positions.len() as u32 - 1
     }
 
     /// The wedge of `label` at `vertex`, made if there is none.
     pub(super) fn wedge_mut(&mut self, vertex: u32, label: Label) -> &mut WorkWedge<Q> {
-        let first = &mut self.first[vertex as usize];
+        let first = &mut self.vertices[vertex as usize].first;
         if first.label == UNSET {
             first.label = label;
         }
         if first.label == label {
-            return &mut self.first[vertex as usize];
+            return &mut self.vertices[vertex as usize].first;
         }
         let mut at = first.next;
         while at != NONE && self.overflow[at as usize].label != label {
@@ -170,7 +158,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         }
         if at == NONE {
             at = self.overflow.len() as u32;
-            let next = std::mem::replace(&mut self.first[vertex as usize].next, at);
+            let next = std::mem::replace(&mut self.vertices[vertex as usize].first.next, at);
             self.overflow.push(WorkWedge { label, next, committed: NONE, quadric: Q::default() });
         }
         &mut self.overflow[at as usize]
@@ -179,7 +167,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     /// The wedges of `vertex`.
     #[inline]
     pub(super) fn wedges(&self, vertex: u32) -> impl Iterator<Item = &WorkWedge<Q>> {
-        let first = &self.first[vertex as usize];
+        let first = &self.vertices[vertex as usize].first;
         let mut next = first.next;
         std::iter::once(first).chain(std::iter::from_fn(move || {
             let wedge = self.overflow.get(next as usize)?;
@@ -214,16 +202,19 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         }
     }
 
-    /// Adds the planes of faces between labels, found among tets from `first_tet` on, to their vertices.
-    fn add_surfaces(&mut self, first_tet: usize, weight: f32) {
+    /// Adds the planes of the faces between labels that `is_wanted`, found among tets from `first_tet` on, to their
+    /// vertices. `weight`: squared levels a squared pixel of distance, a square pixel of surface.
+    pub(super) fn add_surfaces(&mut self, first_tet: usize, is_wanted: impl Fn([bool; 3]) -> bool, weight: f32) {
+        let is_inside = |mesh: &Self, v: u32| mesh.vertices[v as usize].first.next == NONE;
         for tet in first_tet..self.tets.len() {
             let corners = self.tets[tet];
-            if corners.iter().all(|&v| self.first[v as usize].next == NONE) {
+            if corners.iter().all(|&v| is_inside(self, v)) {
                 continue;
             }
             for face in FACES {
                 let face = face.map(|corner| corners[corner]);
-                if face.iter().any(|&v| self.first[v as usize].next == NONE) {
+                let frozen = face.map(|v| self.vertices[v as usize].frozen);
+                if face.iter().any(|&v| is_inside(self, v)) || !is_wanted(frozen) {
                     continue;
                 }
                 // Each face between labels once: from its side of the greater label, which may be an older tet.
@@ -246,19 +237,24 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     }
 
     fn add_plane(&mut self, face: [u32; 3], weight: f32) {
-        let [a, b, c] = face.map(|v| self.positions[v as usize]);
+        let [a, b, c] = face.map(|v| self.vertices[v as usize].position);
         let normal = self.offset(a, b).cross(self.offset(a, c));
         let length = normal.length();
         // A third of the face's area for each corner.
         let quadric = PositionQuadric::plane(normal / length, 0.0, weight * length / 6.0);
         for v in face {
-            let slot = &mut self.surface[v as usize];
-            if *slot == NONE {
-                *slot = self.surfaces.len() as u32;
-                self.surfaces.push(PositionQuadric::default());
-            }
-            self.surfaces[*slot as usize].add_scaled(&quadric, 1.0);
+            self.surface_mut(v).add_scaled(&quadric, 1.0);
         }
+    }
+
+    /// The surface quadric of `vertex`, made if there is none.
+    pub(super) fn surface_mut(&mut self, vertex: u32) -> &mut PositionQuadric {
+        let slot = &mut self.vertices[vertex as usize].surface;
+        if *slot == NONE {
+            *slot = self.surfaces.len() as u32;
+            self.surfaces.push(PositionQuadric::default());
+        }
+        &mut self.surfaces[*slot as usize]
     }
 }
 

@@ -1,0 +1,297 @@
+//! Simplification in blocks: on all cores, and each block small enough for the caches.
+//!
+//! In: a run of mesh that is to join the window, or the window itself. Out: the window with what is left. Blocks are
+//! bands of the picture; vertices that two of them share, or that wait for the next run, are frozen meanwhile. What the
+//! blocks are depends on the mesh alone, so the result does not depend on the number of threads.
+
+use std::collections::HashMap;
+
+use glam::IVec3;
+
+use super::SimplifyParams;
+use super::collapse::{Goal, SimplifyReport, Unfrozen, simplify};
+use super::quadric::WedgeQuadric;
+use super::stars::Stars;
+use super::work_mesh::{NONE, WorkMesh};
+use crate::mesh::{Domain, Sides, TetMesh, Wedge};
+use crate::vectorize::parallel::map;
+
+/// A vertex of more than one block.
+const SHARED: u32 = u32::MAX - 1;
+
+/// How far blocks are simplified.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BlockGoal {
+    /// About which share is to be left of the vertices that only one block has.
+    pub keep: f64,
+    /// As [`Goal::max_error`], over the whole run.
+    pub max_error: f32,
+}
+
+/// A block's part of a run, and which of its vertices are to stay.
+struct Block {
+    mesh: TetMesh,
+    frozen: Vec<bool>,
+}
+
+impl BlockGoal {
+    /// The goal of one of `count` blocks.
+    fn of_one(self, count: usize) -> Self {
+        Self { max_error: self.max_error / count as f32, ..self }
+    }
+}
+
+impl<Q: WedgeQuadric> WorkMesh<Q> {
+    /// Appends a run as [`WorkMesh::append`] does, after simplifying its blocks.
+    pub fn append_simplified(&mut self, run: &TetMesh, goal: BlockGoal, params: &SimplifyParams) -> SimplifyReport {
+        let goal = goal.of_one(params.blocks(run.positions.len()));
+        let blocks = map(split(run, params), |block: Block| {
+            let mut mesh = Self::new(self.domain);
+            mesh.fill(&block, params);
+            let report = mesh.simplify_alone(goal, params);
+            (mesh, report)
+        });
+        let bottom = run.positions.iter().map(|p| p.z).min().unwrap_or(0);
+        let mut glued = self.plane(bottom);
+        glued.values().for_each(|&vertex| self.vertices[vertex as usize].frozen = true);
+        let (first_vertex, first_tet) = (self.vertices.len(), self.tets.len());
+        let mut total = SimplifyReport::default();
+        for (block, report) in blocks {
+            self.absorb(block, &mut glued, params.spread_weight);
+            total.add(&report);
+        }
+        total.vertices_in_window = self.vertices.len() - first_vertex;
+        self.stars = Stars::new(self.vertices.len(), &self.tets);
+        // The blocks have seen all faces but those between frozen vertices.
+        self.add_surfaces(first_tet, |frozen| frozen == [true; 3], params.surface_weight);
+        self.vertices.iter_mut().for_each(|vertex| vertex.frozen = false);
+        total
+    }
+
+    /// Simplifies what is not frozen of the window block by block.
+    pub fn simplify_blocks(&mut self, unfrozen: Unfrozen, goal: BlockGoal, params: &SimplifyParams) -> SimplifyReport {
+        let goal = goal.of_one(params.blocks(self.vertices.len()));
+        let bands = Bands { count: params.blocks(self.vertices.len()) + 1, shift: 0.5, domain: self.domain };
+        let of_tet: Vec<u32> = (0..self.tets.len())
+            .map(|tet| bands.of(self.tets[tet].map(|v| self.vertices[v as usize].position)))
+            .collect();
+        let mut owners = owners(self.vertices.len(), self.tets.iter().copied().zip(of_tet.iter().copied()));
+        for (owner, vertex) in owners.iter_mut().zip(&self.vertices) {
+            if *owner != NONE && unfrozen.freezes(vertex.position.z) {
+                *owner = SHARED;
+            }
+        }
+        let blocks = self.take_blocks(&of_tet, &owners, bands.count);
+        let blocks = map(blocks, |mut block: Self| {
+            let report = block.simplify_alone(goal, params);
+            (block, report)
+        });
+        let mut glued = self.vertices.iter().zip(0..).map(|(vertex, number)| (vertex.position, number)).collect();
+        let mut total = SimplifyReport::default();
+        for (block, report) in blocks {
+            self.absorb(block, &mut glued, 0.0);
+            total.add(&report);
+        }
+        self.stars = Stars::new(self.vertices.len(), &self.tets);
+        self.vertices.iter_mut().for_each(|vertex| vertex.frozen = false);
+        total
+    }
+
+    /// Takes all tets out, and the vertices that only one block has. Of a shared vertex the first block that has it takes
+    /// the quadrics; the vertex itself stays.
+    fn take_blocks(&mut self, of_tet: &[u32], owners: &[u32], count: usize) -> Vec<Self> {
+        let mut blocks: Vec<Self> = (0..count).map(|_| Self::new(self.domain)).collect();
+        let mut numbers = vec![NONE; self.vertices.len()];
+        let mut order: Vec<u32> = (0..self.tets.len() as u32).collect();
+        order.sort_by_key(|&tet| of_tet[tet as usize]);
+        let mut taken = vec![false; self.vertices.len()];
+        for same in order.chunk_by(|&a, &b| of_tet[a as usize] == of_tet[b as usize]) {
+            let block = &mut blocks[of_tet[same[0] as usize] as usize];
+            let mut members = Vec::new();
+            for &tet in same {
+                let corners = self.tets[tet as usize].map(|v| {
+                    if numbers[v as usize] == NONE {
+                        let is_first = !std::mem::replace(&mut taken[v as usize], true);
+                        numbers[v as usize] = self.copy_vertex(v, block, owners[v as usize] == SHARED, is_first);
+                        members.push(v);
+                    }
+                    numbers[v as usize]
+                });
+                block.tets.push(corners);
+                block.labels.push(self.labels[tet as usize]);
+            }
+            members.into_iter().for_each(|v| numbers[v as usize] = NONE);
+            block.stars = Stars::new(block.vertices.len(), &block.tets);
+        }
+        self.keep_shared(owners);
+        blocks
+    }
+
+    /// Copies a vertex into a block, with its quadrics or with empty ones.
+    fn copy_vertex(&self, v: u32, block: &mut Self, frozen: bool, with_quadrics: bool) -> u32 {
+        let vertex = &self.vertices[v as usize];
+        let copy = block.push_vertex(vertex.position, frozen);
+        block.vertices[copy as usize].sides = vertex.sides;
+        for wedge in self.wedges(v) {
+            let own = block.wedge_mut(copy, wedge.label);
+            if with_quadrics {
+                own.quadric = wedge.quadric;
+            }
+        }
+        if with_quadrics && let Some(surface) = self.surfaces.get(vertex.surface as usize) {
+            *block.surface_mut(copy) = *surface;
+        }
+        copy
+    }
+
+    /// Leaves only shared vertices, without tets and quadrics.
+    fn keep_shared(&mut self, owners: &[u32]) {
+        self.tets.clear();
+        self.labels.clear();
+        self.surfaces.clear();
+        let old_overflow = std::mem::take(&mut self.overflow);
+        let old = std::mem::take(&mut self.vertices).into_iter().zip(std::mem::take(&mut self.committed));
+        for ((vertex, committed), _) in old.zip(owners).filter(|&(_, &owner)| owner == SHARED) {
+            let kept = self.push_vertex(vertex.position, true);
+            self.committed[kept as usize] = committed;
+            self.vertices[kept as usize].sides = vertex.sides;
+            let mut wedge = Some(&vertex.first);
+            while let Some(old) = wedge {
+                self.wedge_mut(kept, old.label).committed = old.committed;
+                wedge = old_overflow.get(old.next as usize);
+            }
+        }
+    }
+
+    /// Simplifies a block by itself.
+    fn simplify_alone(&mut self, BlockGoal { keep, max_error }: BlockGoal, params: &SimplifyParams) -> SimplifyReport {
+        let frozen = self.vertices.iter().filter(|vertex| vertex.frozen).count();
+        let free = self.vertices.len() - frozen;
+        let goal = Goal {
+            vertices: frozen + (keep * free as f64) as usize,
+            before: i32::MAX,
+            vertices_in_window: usize::MAX,
+            max_cost: f32::MAX,
+            max_error,
+        };
+        simplify(self, Unfrozen { low: i32::MIN, high: i32::MAX }, goal, params)
+    }
+
+    /// Fills an empty mesh with a block.
+    fn fill(&mut self, block: &Block, params: &SimplifyParams) {
+        let vertices: Vec<u32> = block
+            .mesh
+            .positions
+            .iter()
+            .zip(&block.frozen)
+            .map(|(&position, &frozen)| self.push_vertex(position, frozen))
+            .collect();
+        self.add_tets(&block.mesh, &vertices);
+        self.spread(0, params.spread_weight);
+        self.stars = Stars::new(self.vertices.len(), &self.tets);
+        self.add_surfaces(0, |frozen| frozen != [true; 3], params.surface_weight);
+    }
+
+    /// Takes over a block; its frozen vertices meet those of the same position in `glued`.
+    fn absorb(&mut self, block: Self, glued: &mut HashMap<IVec3, u32>, spread_weight: f32) {
+        let mut numbers = vec![NONE; block.vertices.len()];
+        for (vertex, number) in block.vertices.iter().zip(&mut numbers).filter(|(vertex, _)| vertex.stamp != NONE) {
+            let known = if vertex.frozen { glued.get(&vertex.position).copied() } else { None };
+            *number = known.unwrap_or_else(|| {
+                let new = self.push_vertex(vertex.position, vertex.frozen);
+                self.vertices[new as usize].sides = vertex.sides;
+                if vertex.frozen {
+                    glued.insert(vertex.position, new);
+                    self.wedge_mut(new, vertex.first.label).quadric.add(&Q::of_point(spread_weight));
+                }
+                new
+            });
+            let mut wedge = Some(&vertex.first);
+            while let Some(own) = wedge {
+                self.wedge_mut(*number, own.label).quadric.add(&own.quadric);
+                wedge = block.overflow.get(own.next as usize);
+            }
+            if let Some(surface) = block.surfaces.get(vertex.surface as usize) {
+                self.surface_mut(*number).add_scaled(surface, 1.0);
+            }
+        }
+        for (tet, label) in block.tets.into_iter().zip(block.labels).filter(|(tet, _)| tet[0] != NONE) {
+            self.tets.push(tet.map(|v| numbers[v as usize]));
+            self.labels.push(label);
+        }
+    }
+}
+
+/// Bands across the picture's longer side.
+#[derive(Clone, Copy)]
+struct Bands {
+    count: usize,
+    /// By which part of a band they are moved.
+    shift: f64,
+    domain: Domain,
+}
+
+impl Bands {
+    /// The band of the tet with these corners.
+    fn of(&self, corners: [IVec3; 4]) -> u32 {
+        let axis = usize::from(self.domain.height > self.domain.width);
+        let middle = corners.iter().map(|p| f64::from(p[axis])).sum::<f64>() / 4.0;
+        let whole = self.count as f64 - self.shift;
+        let band = middle / f64::from(self.domain.extent()[axis]) * whole + self.shift;
+        (band as u32).min(self.count as u32 - 1)
+    }
+}
+
+/// Cuts a run into bands.
+fn split(run: &TetMesh, params: &SimplifyParams) -> Vec<Block> {
+    let bands = Bands { count: params.blocks(run.positions.len()), shift: 0.0, domain: run.domain };
+    let of_tet: Vec<u32> = (0..run.tets.len()).map(|tet| bands.of(run.tet_positions(tet))).collect();
+    let corners = (0..run.tets.len()).map(|tet| run.tet_vertices(tet).map(|v| v.0));
+    let mut owners = owners(run.positions.len(), corners.zip(of_tet.iter().copied()));
+    let times = || run.positions.iter().map(|p| p.z);
+    let ends = [times().min(), times().max()];
+    for (owner, position) in owners.iter_mut().zip(&run.positions) {
+        let sides = run.domain.sides(*position);
+        let at_end = sides.contains(Sides::T_LOW) || sides.contains(Sides::T_HIGH);
+        if ends.contains(&Some(position.z)) && !at_end {
+            *owner = SHARED;
+        }
+    }
+    let mut tets = vec![Vec::new(); bands.count];
+    (0..run.tets.len()).for_each(|tet| tets[of_tet[tet] as usize].push(tet));
+    map(tets, |tets| cut(run, &tets, &owners))
+}
+
+/// The only block that a vertex is in, or [`SHARED`].
+fn owners(vertices: usize, tets: impl Iterator<Item = ([u32; 4], u32)>) -> Vec<u32> {
+    let mut owners = vec![NONE; vertices];
+    for (tet, block) in tets {
+        for vertex in tet {
+            let owner = &mut owners[vertex as usize];
+            *owner = if *owner == NONE || *owner == block { block } else { SHARED };
+        }
+    }
+    owners
+}
+
+/// The mesh of some of a run's tets.
+fn cut(run: &TetMesh, tets: &[usize], owners: &[u32]) -> Block {
+    let mut vertices = HashMap::new();
+    let mut wedges = HashMap::new();
+    let mut mesh = TetMesh::empty(run.domain);
+    let mut frozen = Vec::new();
+    for &tet in tets {
+        let corners = run.tets[tet].map(|wedge| {
+            *wedges.entry(wedge).or_insert_with(|| {
+                let whole = run.wedges[wedge.index()];
+                let vertex = *vertices.entry(whole.vertex).or_insert_with(|| {
+                    frozen.push(owners[whole.vertex.index()] == SHARED);
+                    mesh.push_vertex(run.positions[whole.vertex.index()])
+                });
+                mesh.push_wedge(Wedge { vertex, ..whole })
+            })
+        });
+        mesh.tets.push(corners);
+    }
+    Block { mesh, frozen }
+}
