@@ -4,6 +4,7 @@
 //! and writes (§VI). Slabs follow each other from keyframe to keyframe.
 
 mod config;
+mod observer;
 mod readiness;
 mod runs;
 mod slab;
@@ -14,6 +15,8 @@ use std::sync::Arc;
 use thiserror::Error;
 
 pub use self::config::{EncoderConfig, ErrorMetric, LatticeKind, SpeedPreset};
+use self::observer::Observer;
+pub use self::observer::{Event, Stage};
 use self::slab::{SlabEncoder, SlabEnd, WindowEncoder};
 use crate::bitstream::{IndexWriter, Packet, SequenceHeader, WriteError};
 use crate::vectorize::cleave::CleaveError;
@@ -74,6 +77,7 @@ pub struct Encoder {
     index: IndexWriter,
     vertices: u64,
     error_gain: f64,
+    observer: Observer,
     finished: bool,
     #[cfg(feature = "threads")]
     pool: Option<rayon::ThreadPool>,
@@ -101,11 +105,17 @@ impl Encoder {
             index: IndexWriter::new(),
             vertices: 0,
             error_gain: slab::ERROR_GAIN,
+            observer: Observer::default(),
             finished: false,
             #[cfg(feature = "threads")]
             pool: thread_pool(config.threads)?,
             config,
         })
+    }
+
+    /// Tells `observer` from now on what the encoder does.
+    pub fn observe(&mut self, observer: impl FnMut(Event) + Send + 'static) {
+        self.observer = Observer(Some(Box::new(observer)));
     }
 
     /// The settings.
@@ -169,7 +179,7 @@ impl Encoder {
             if self.segmenter.is_scene_cut(&frame) {
                 self.end_slab(SlabEnd::Held)?;
             } else if force_keyframe || slab.planes() >= self.config.slab_frames() {
-                let labels = self.segmenter.push(&frame);
+                let labels = self.observer.stage(Stage::Segment, || self.segmenter.push(&frame));
                 self.end_slab(SlabEnd::Joined(frame.clone(), labels))?;
             }
         }
@@ -178,9 +188,9 @@ impl Encoder {
             self.slab = Some(self.new_slab()?);
         }
         self.next_frame += 1;
-        let labels = self.segmenter.push(&frame);
+        let labels = self.observer.stage(Stage::Segment, || self.segmenter.push(&frame));
         if let Some(slab) = &mut self.slab {
-            let packets = slab.push(frame, labels)?;
+            let packets = slab.push(frame, labels, &mut self.observer)?;
             self.queue(packets);
         }
         Ok(())
@@ -199,7 +209,7 @@ impl Encoder {
 
     fn end_slab(&mut self, end: SlabEnd) -> Result<(), EncodeError> {
         if let Some(slab) = self.slab.take() {
-            let finished = slab.finish(end)?;
+            let finished = slab.finish(end, &mut self.observer)?;
             self.vertices += finished.vertices;
             self.error_gain = finished.error_gain;
             self.queue(finished.packets);

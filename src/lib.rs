@@ -28,5 +28,5 @@ pub mod video;
 pub use bitstream::{Packet, SequenceHeader};
 pub use decoder::{DecodeError, Decoder, DecoderConfig, Viewport};
 #[cfg(feature = "encode")]
-pub use encoder::{EncodeError, Encoder, EncoderConfig, ErrorMetric, LatticeKind, SpeedPreset};
+pub use encoder::{EncodeError, Encoder, EncoderConfig, ErrorMetric, Event, LatticeKind, SpeedPreset, Stage};
 pub use video::{Frame, PixelFormat, Plane, Surface, YuvMatrix};

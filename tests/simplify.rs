@@ -218,7 +218,7 @@ fn refusals_have_names() {
 #[test]
 fn blocks_join_into_one_tiling() {
     let clip = Clip::new([24, 15, 11], textured, |x, y, t| u32::from((x + t) / 6 > y / 3) + (x + y) / 20);
-    let params = SimplifyParams { block_vertices: 400, ..SimplifyParams::default() };
+    let params = SimplifyParams { block_vertices: 1500, ..SimplifyParams::default() };
     let simplified = || {
         let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
         let goal = BlockGoal { keep: 0.5, max_error: f32::INFINITY };
@@ -232,7 +232,7 @@ fn blocks_join_into_one_tiling() {
         let before = work.vertex_count();
         let report = work.simplify_blocks(ALL, goal, &params);
         assert_eq!(work.vertex_count() as u64, before as u64 - report.collapses);
-        assert!(work.vertex_count() < 2 * before / 3, "{before}: {report:?}");
+        assert!(report.collapses > before as u64 / 8, "{before}: {report:?}");
         let last = simplify(&mut work, ALL, self::goal(100), &params);
         assert_eq!(last.vertices, 100);
         let mut mesh = TetMesh::empty(clip.domain);
@@ -250,7 +250,7 @@ fn blocks_join_into_one_tiling() {
 #[test]
 fn blocks_leave_frozen_vertices() {
     let clip = Clip::new([24, 15, 9], textured, |_, _, _| 0);
-    let params = SimplifyParams { block_vertices: 400, ..SimplifyParams::default() };
+    let params = SimplifyParams { block_vertices: 1500, ..SimplifyParams::default() };
     let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
     work.append(&clip.whole(), &params);
     let unfrozen = Unfrozen { low: 2 * 8, high: 6 * 8 };

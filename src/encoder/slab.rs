@@ -3,12 +3,13 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use super::observer::{Event, Observer, Stage};
 use super::readiness::{FAR, hops};
 use super::runs::{Run, Runs};
 use super::{EncodeError, EncoderConfig};
 use crate::bitstream::{Packet, RINGS, SlabWriter};
 use crate::mesh::{Domain, StarTable, TetMesh};
-use crate::vectorize::fit::{FitParams, FitRequest, fit};
+use crate::vectorize::fit::{FitParams, FitReport, FitRequest, fit};
 use crate::vectorize::lattice::AdaptiveLattice;
 use crate::vectorize::simplify::{BlockGoal, Goal, SimplifyParams, Unfrozen, WedgeQuadric, WorkMesh, simplify};
 use crate::video::{Frame, LabelPlane, Volume};
@@ -56,11 +57,16 @@ pub(super) struct FinishedSlab {
 /// A slab's encoder, whatever its error metric.
 pub(super) trait WindowEncoder: Send {
     /// Takes the next frame; gives the packets that became ready.
-    fn push(&mut self, frame: Arc<Frame>, labels: LabelPlane) -> Result<Vec<Packet>, EncodeError>;
+    fn push(
+        &mut self,
+        frame: Arc<Frame>,
+        labels: LabelPlane,
+        observer: &mut Observer,
+    ) -> Result<Vec<Packet>, EncodeError>;
     /// Frames taken so far.
     fn planes(&self) -> u32;
     /// Ends the slab.
-    fn finish(self: Box<Self>, end: SlabEnd) -> Result<FinishedSlab, EncodeError>;
+    fn finish(self: Box<Self>, end: SlabEnd, observer: &mut Observer) -> Result<FinishedSlab, EncodeError>;
 }
 
 /// Most frames between the arrival of a frame and its packet with windows of `window` frames: the packet's tets and
@@ -144,18 +150,20 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     }
 
     /// Puts the runs that are ready into the window, one after another.
-    fn advance(&mut self, frames: Option<u32>) -> Result<Vec<Packet>, EncodeError> {
+    fn advance(&mut self, frames: Option<u32>, observer: &mut Observer) -> Result<Vec<Packet>, EncodeError> {
         let mut packets = Vec::new();
-        let runs = self.runs.take_ready(frames.is_some())?;
+        let runs = observer.stage(Stage::Lattice, || self.runs.take_ready(frames.is_some()))?;
         let count = runs.len();
         for (n, Run { mesh, last }) in runs.into_iter().enumerate() {
             let goal = self.goal_of_run(&mesh, last - self.lead);
-            let report = self.work.append_simplified(&mesh, goal, &self.simplify_params);
+            let report =
+                observer.stage(Stage::Simplify, || self.work.append_simplified(&mesh, goal, &self.simplify_params));
             log::debug!("blocks: {report:?}");
+            observer.tell(Event::Simplified(report));
             self.lead = last;
             log::debug!("run up to frame {last}: {} vertices, {} tets", mesh.positions.len(), mesh.tets.len());
             drop(mesh);
-            packets.extend(self.step(frames.filter(|_| n + 1 == count))?);
+            packets.extend(self.step(frames.filter(|_| n + 1 == count), observer)?);
         }
         Ok(packets)
     }
@@ -193,25 +201,29 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     }
 
     /// Simplifies and hands on; with `frames` the slab has ended and has that many.
-    fn step(&mut self, frames: Option<u32>) -> Result<Vec<Packet>, EncodeError> {
+    fn step(&mut self, frames: Option<u32>, observer: &mut Observer) -> Result<Vec<Packet>, EncodeError> {
         let unit = self.committed.domain.unit();
         let lead = self.lead as i32;
         let high = if frames.is_some() { i32::MAX } else { lead * unit };
         let goal = self.goal(frames, lead);
         let unfrozen = Unfrozen { low: self.frozen, high };
+        observer.tell(Event::Began(Stage::Simplify));
         if let Some(goal) = self.goal_of_blocks(&goal) {
             let report = self.work.simplify_blocks(unfrozen, goal, &self.simplify_params);
             log::debug!("blocks of the window: {report:?}");
+            observer.tell(Event::Simplified(report));
         }
         let report = simplify(&mut self.work, unfrozen, goal, &self.simplify_params);
         log::debug!("simplify: {report:?}, {goal:?}");
+        observer.tell(Event::Simplified(report));
+        observer.tell(Event::Ended);
         self.frozen = match frames {
             Some(_) => i32::MAX,
             // What the goal counted.
             None => self.frozen.max(goal.before - 1),
         };
         self.work.commit(self.frozen, &mut self.committed);
-        self.send_ready(frames)
+        self.send_ready(frames, observer)
     }
 
     /// What the next commit will take must have reached the simplification ratio. Between it and the frozen leading
@@ -237,7 +249,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     }
 
     /// Fits and writes the packets whose tets are committed.
-    fn send_ready(&mut self, frames: Option<u32>) -> Result<Vec<Packet>, EncodeError> {
+    fn send_ready(&mut self, frames: Option<u32>, observer: &mut Observer) -> Result<Vec<Packet>, EncodeError> {
         let stars = StarTable::new(&self.committed);
         let incomplete = self.work.committed_vertices();
         let is_ready = |k: u32| {
@@ -251,11 +263,14 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         if end == self.sent || (frames.is_none() && end < self.sent + self.batch) {
             return Ok(Vec::new());
         }
-        self.fit(&stars)?;
+        let report = observer.stage(Stage::Fit, || self.fit(&stars))?;
+        observer.tell(Event::Fitted(report));
+        observer.tell(Event::Began(Stage::Write));
         let mut packets = Vec::new();
         for k in self.sent..end {
             packets.push(self.writer.write_packet(&self.committed, Some(k + 1) == frames)?);
         }
+        observer.tell(Event::Ended);
         self.sent = end;
         self.forget_frames(&stars);
         Ok(packets)
@@ -269,7 +284,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         hops(&self.committed, stars, self.sent - 1).into_iter().map(|hop| hop >= FAR).collect()
     }
 
-    fn fit(&mut self, stars: &StarTable) -> Result<(), EncodeError> {
+    fn fit(&mut self, stars: &StarTable) -> Result<FitReport, EncodeError> {
         let free = self.unsent(stars);
         let report = fit(&mut FitRequest {
             mesh: &mut self.committed,
@@ -283,7 +298,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         if self.target_error > 0.0 && reached > 0.0 {
             self.error_gain *= (self.target_error / reached).powi(2).clamp(0.5, 2.0);
         }
-        Ok(())
+        Ok(report)
     }
 
     /// Lets go of frames that no tet with an unsent vertex, nor any tet to come, reaches.
@@ -306,16 +321,21 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
 }
 
 impl<Q: WedgeQuadric> WindowEncoder for SlabEncoder<Q> {
-    fn push(&mut self, frame: Arc<Frame>, labels: LabelPlane) -> Result<Vec<Packet>, EncodeError> {
+    fn push(
+        &mut self,
+        frame: Arc<Frame>,
+        labels: LabelPlane,
+        observer: &mut Observer,
+    ) -> Result<Vec<Packet>, EncodeError> {
         self.take(frame, labels);
-        self.advance(None)
+        self.advance(None, observer)
     }
 
     fn planes(&self) -> u32 {
         self.planes
     }
 
-    fn finish(mut self: Box<Self>, end: SlabEnd) -> Result<FinishedSlab, EncodeError> {
+    fn finish(mut self: Box<Self>, end: SlabEnd, observer: &mut Observer) -> Result<FinishedSlab, EncodeError> {
         let frames = self.planes;
         match end {
             SlabEnd::Joined(frame, labels) => self.take(frame, labels),
@@ -331,7 +351,7 @@ impl<Q: WedgeQuadric> WindowEncoder for SlabEncoder<Q> {
         let duration = self.planes - 1;
         self.work.set_duration(duration);
         self.committed.domain.duration = duration;
-        let packets = self.advance(Some(frames))?;
+        let packets = self.advance(Some(frames), observer)?;
         let vertices = self.committed.positions.len() as u64;
         Ok(FinishedSlab { packets, vertices, error_gain: self.error_gain })
     }

@@ -7,7 +7,9 @@ mod damage;
 
 use clips::{bars, config, decode, disc, encode, picture, psnr};
 use tetvec::metrics::simplification_ratio;
-use tetvec::{DecodeError, Decoder, DecoderConfig, EncodeError, Encoder, EncoderConfig, ErrorMetric, Frame, Surface};
+use tetvec::{
+    DecodeError, Decoder, DecoderConfig, EncodeError, Encoder, EncoderConfig, ErrorMetric, Event, Frame, Stage, Surface,
+};
 
 const SIZE: (u32, u32) = (24, 16);
 
@@ -193,4 +195,32 @@ fn frames_of_another_size_are_refused_and_the_stream_goes_on() {
     }
     encoder.finish().expect("a stream");
     assert_eq!(std::iter::from_fn(|| encoder.receive_packet()).count(), 3);
+}
+
+/// Whoever asks is told of every stage, in brackets, and of what collapses and fits did.
+#[test]
+fn an_observer_hears_of_every_stage() {
+    use std::sync::{Arc, Mutex};
+    let heard = Arc::new(Mutex::new(Vec::new()));
+    let mut encoder = Encoder::try_new(config(SIZE)).expect("good settings");
+    let told = heard.clone();
+    encoder.observe(move |event| told.lock().unwrap().push(event));
+    for frame in disc(SIZE, 0, 6) {
+        encoder.send_frame(frame, false).expect("a good frame");
+    }
+    encoder.finish().expect("an end");
+    let heard = heard.lock().unwrap();
+    for stage in Stage::ALL {
+        assert!(heard.contains(&Event::Began(stage)), "{}", stage.name());
+    }
+    let mut open = false;
+    for event in heard.iter() {
+        match event {
+            Event::Began(_) => assert!(!std::mem::replace(&mut open, true), "one stage at a time"),
+            Event::Ended => assert!(std::mem::replace(&mut open, false)),
+            Event::Simplified(_) | Event::Fitted(_) => {}
+        }
+    }
+    assert!(heard.iter().any(|event| matches!(event, Event::Simplified(report) if report.collapses > 0)));
+    assert!(heard.iter().any(|event| matches!(event, Event::Fitted(report) if report.pixels > 0)));
 }
