@@ -2,6 +2,8 @@
 //!
 //! Any video becomes y4m with `ffmpeg -i in.mp4 -pix_fmt yuv420p in.y4m`.
 
+#[path = "vectorize/settings.rs"]
+mod settings;
 #[path = "vectorize/source.rs"]
 mod source;
 
@@ -13,8 +15,9 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
+use settings::Settings;
 use tetvec::metrics::simplification_ratio;
-use tetvec::{Encoder, EncoderConfig, ErrorMetric};
+use tetvec::{Encoder, EncoderConfig};
 
 /// Turns raster video into a vector stream.
 #[derive(Debug, Parser)]
@@ -22,33 +25,11 @@ struct Arguments {
     /// A .y4m file (-: standard input) or PNG pictures in the order given, then the .tetv file to write.
     #[arg(required = true, num_args = 2..)]
     files: Vec<PathBuf>,
-    /// Vertices of the mesh over pixels of the source.
-    #[arg(long, default_value_t = 0.01)]
-    simplification_ratio: f64,
-    /// Mean absolute error to simplify up to, in levels; 0: off.
-    #[arg(long, default_value_t = 0.0)]
-    target_error: f64,
-    /// Length of the sliding window in frames.
-    #[arg(long, default_value_t = 10)]
-    window: u32,
-    /// Most frames from one keyframe to the next.
-    #[arg(long, default_value_t = 60)]
-    key_int_max: u32,
-    /// Mean number of superpixels a frame; 0: chosen by content; 1: no discontinuities.
-    #[arg(long, default_value_t = 1)]
-    superpixels: u32,
-    /// Levels of subdivision that the stream is to be drawn with.
-    #[arg(long, default_value_t = 1)]
-    subdivision_levels: u8,
-    /// Use the paper's error metric.
-    #[arg(long)]
-    paper_metric: bool,
+    #[command(flatten)]
+    settings: Settings,
     /// Stop after this many frames.
     #[arg(long)]
     frames: Option<usize>,
-    /// Worker threads; 0: all cores.
-    #[arg(long, default_value_t = 0)]
-    threads: usize,
 }
 
 fn main() -> ExitCode {
@@ -68,15 +49,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let mut encoder = Encoder::try_new(EncoderConfig {
         frame_rate: source.frame_rate,
         pixel_aspect_ratio: source.pixel_aspect_ratio,
-        simplification_ratio: arguments.simplification_ratio,
-        target_error: arguments.target_error,
-        window: arguments.window,
-        key_int_max: arguments.key_int_max,
-        superpixels: arguments.superpixels,
-        subdivision_levels: arguments.subdivision_levels,
-        error_metric: if arguments.paper_metric { ErrorMetric::Paper } else { ErrorMetric::Color },
-        threads: arguments.threads,
-        ..EncoderConfig::new(source.width, source.height)
+        ..arguments.settings.config(source.width, source.height)
     })?;
     let mut file = BufWriter::new(File::create(output)?);
     let length = source.length.map(|length| length.min(arguments.frames.unwrap_or(usize::MAX)) as u64);

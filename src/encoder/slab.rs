@@ -31,6 +31,9 @@ const RUN_ERROR: f32 = 0.25;
 /// 140 to 180 on natural clips. Where it starts; each fit corrects it.
 pub(super) const ERROR_GAIN: f64 = 150.0;
 
+/// Most vertices that are fitted at once.
+const FIT_VERTICES: usize = 300_000;
+
 /// Mean absolute error over root mean square error, about that of a Laplacian's residuals: 0.55 to 0.61 on natural
 /// clips.
 const ABSOLUTE_OVER_RMS: f64 = 0.58;
@@ -284,21 +287,37 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         hops(&self.committed, stars, self.sent - 1).into_iter().map(|hop| hop >= FAR).collect()
     }
 
+    /// Fits what is unsent, in parts by time where it is large: memory follows the part.
     fn fit(&mut self, stars: &StarTable) -> Result<FitReport, EncodeError> {
         let free = self.unsent(stars);
-        let report = fit(&mut FitRequest {
-            mesh: &mut self.committed,
-            free: &free,
-            frames: &self.volume,
-            labels: self.labels.make_contiguous(),
-            params: &self.fit_params,
-        })?;
-        log::debug!("fit: {report:?}");
-        let reached = ABSOLUTE_OVER_RMS * report.rms_after;
-        if self.target_error > 0.0 && reached > 0.0 {
+        let mut times: Vec<i32> =
+            free.iter().zip(&self.committed.positions).filter(|(free, _)| **free).map(|(_, p)| p.z).collect();
+        times.sort_unstable();
+        let parts = times.len().div_ceil(FIT_VERTICES).max(1);
+        let mut total = FitReport::default();
+        let mut low = i32::MIN;
+        for part in 1..=parts {
+            let high = if part == parts { i32::MAX } else { times[part * times.len() / parts] };
+            let positions = &self.committed.positions;
+            let in_part = |v: usize| free[v] && (low..high).contains(&positions[v].z);
+            let free: Vec<bool> = (0..free.len()).map(in_part).collect();
+            let report = fit(&mut FitRequest {
+                mesh: &mut self.committed,
+                free: &free,
+                frames: &self.volume,
+                labels: self.labels.make_contiguous(),
+                params: &self.fit_params,
+            })?;
+            log::debug!("fit: {report:?}");
+            total = total.with(&report);
+            // A vertex may have moved past the limit; it is fitted again in the next part, which does no harm.
+            low = high;
+        }
+        let reached = ABSOLUTE_OVER_RMS * total.rms_after;
+        if self.is_steered() && reached > 0.0 {
             self.error_gain *= (self.target_error / reached).powi(2).clamp(0.5, 2.0);
         }
-        Ok(report)
+        Ok(total)
     }
 
     /// Lets go of frames that no tet with an unsent vertex, nor any tet to come, reaches.

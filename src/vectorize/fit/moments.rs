@@ -214,34 +214,60 @@ impl Polygon {
         let corners = &self.corners[..self.len];
         let low = corners.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
         let high = corners.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
-        for y in first_centre(low, height)..first_centre(high, height) {
-            let (left, right) = self.crossing(f64::from(y) + 0.5);
+        let rows = first_centre(low, height)..first_centre(high, height);
+        if rows.is_empty() {
+            return;
+        }
+        let mut edges = [Edge::default(); 4];
+        for (n, edge) in edges[..self.len].iter_mut().enumerate() {
+            *edge = Edge::new(corners[n], corners[(n + 1) % self.len]);
+        }
+        for y in rows {
+            let centre = f64::from(y) + 0.5;
+            let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
+            for edge in &edges[..self.len] {
+                if let Some(x) = edge.crossing(centre) {
+                    left = left.min(x);
+                    right = right.max(x);
+                }
+            }
             let (from, to) = (first_centre(left, width), first_centre(right, width));
             if from < to {
                 span(y, from, to);
             }
         }
     }
+}
 
-    /// Where the line of height `y` enters and leaves.
-    fn crossing(&self, y: f64) -> (f64, f64) {
-        let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
-        for i in 0..self.len {
-            let (p, q) = (self.corners[i], self.corners[(i + 1) % self.len]);
-            let (p, q) = if (p.y, p.x) <= (q.y, q.x) { (p, q) } else { (q, p) };
-            if p.y <= y && y < q.y {
-                let x = p.x + (y - p.y) * ((q.x - p.x) / (q.y - p.y));
-                left = left.min(x);
-                right = right.max(x);
-            }
-        }
-        (left, right)
+/// An edge of a slice, from its upper end down: all who share it compute the same crossings.
+#[derive(Debug, Clone, Copy, Default)]
+struct Edge {
+    start: DVec2,
+    end: f64,
+    slope: f64,
+}
+
+impl Edge {
+    fn new(p: DVec2, q: DVec2) -> Self {
+        let (p, q) = if (p.y, p.x) <= (q.y, q.x) { (p, q) } else { (q, p) };
+        // Without a height it crosses no line, whatever the slope.
+        Self { start: p, end: q.y, slope: (q.x - p.x) / (q.y - p.y) }
+    }
+
+    /// Where the line of height `y` crosses it; ends count above, not below.
+    #[inline]
+    fn crossing(&self, y: f64) -> Option<f64> {
+        (self.start.y <= y && y < self.end).then(|| self.start.x + (y - self.start.y) * self.slope)
     }
 }
 
 /// The first pixel of 0..len whose centre is at or beyond `x`; len if none. (NaN and infinities give an end.)
+#[inline]
 fn first_centre(x: f64, len: u32) -> u32 {
-    (x - 0.5).ceil().clamp(0.0, f64::from(len)) as u32
+    // Clamped before it is rounded up by hand: a call of `ceil` costs more than the rest.
+    let shifted = (x - 0.5).clamp(0.0, f64::from(len));
+    let whole = shifted as u32;
+    whole + u32::from(f64::from(whole) < shifted)
 }
 
 /// The sums while they grow, four corners to a vector.

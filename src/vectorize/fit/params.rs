@@ -169,3 +169,31 @@ pub struct FitReport {
     /// What became of folds.
     pub pins: PinReport,
 }
+
+impl FitReport {
+    /// What two fits of different vertices reached together.
+    #[must_use]
+    pub fn with(&self, other: &Self) -> Self {
+        let pixels = (self.pixels + other.pixels).max(1) as f64;
+        let mean = |of: fn(&Self) -> f64| {
+            let squares = of(self).powi(2) * self.pixels as f64 + of(other).powi(2) * other.pixels as f64;
+            (squares / pixels).sqrt()
+        };
+        Self {
+            pixels: self.pixels + other.pixels,
+            distance_before: mean(|report| report.distance_before),
+            distance_after: mean(|report| report.distance_after),
+            rms_before: mean(|report| report.rms_before),
+            rms_colors: mean(|report| report.rms_colors),
+            rms_positions: mean(|report| report.rms_positions),
+            rms_after: mean(|report| report.rms_after),
+            position_steps: self.position_steps.max(other.position_steps),
+            refused_moves: self.refused_moves + other.refused_moves,
+            pins: PinReport {
+                folded_tets: self.pins.folded_tets + other.pins.folded_tets,
+                pinned_vertices: self.pins.pinned_vertices + other.pins.pinned_vertices,
+                left_folded: self.pins.left_folded + other.pins.left_folded,
+            },
+        }
+    }
+}

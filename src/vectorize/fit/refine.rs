@@ -50,6 +50,8 @@ pub(super) fn optimize_positions(
         report.refused += guard.move_all(&mut patch.mesh, &wish.steps);
         let mut tried = State { colors: state.colors.clone(), moments: Vec::new(), error: 0.0 };
         tried.colors.add(&wish.colors);
+        // The moments are most of a fit's memory: one set at a time. Steps that fail are few.
+        state.moments = Vec::new();
         tried.look(patch, model, frames, params);
         if tried.error < state.error {
             let gain = (state.error - tried.error) / state.error;
@@ -61,6 +63,7 @@ pub(super) fn optimize_positions(
             }
         } else {
             patch.mesh.positions = before;
+            state.measure(patch, model, frames);
             damping *= DAMPING_BAD;
             if damping > DAMPING_RANGE[1] {
                 break;
@@ -95,10 +98,14 @@ impl State {
 
     /// Measures at the patch's positions and lets the colours follow.
     fn look(&mut self, patch: &Patch, model: &Model, frames: &Volume, params: &FitParams) {
-        let points = model.points(&patch.mesh.positions);
-        self.moments = measure(model, &points, &model.node_colors(&self.colors.now), frames);
+        self.measure(patch, model, frames);
         self.colors.optimize(model, &self.moments, params.color_steps_between, params);
         self.error = squared_error(model, &self.moments, &self.colors.now);
+    }
+
+    fn measure(&mut self, patch: &Patch, model: &Model, frames: &Volume) {
+        let points = model.points(&patch.mesh.positions);
+        self.moments = measure(model, &points, &model.node_colors(&self.colors.now), frames);
     }
 
     fn step(&self, patch: &Patch, model: &Model, params: &FitParams, damping: f32) -> Wish {

@@ -81,6 +81,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
                 *owner = SHARED;
             }
         }
+        self.stars = Stars::default();
         let blocks = self.take_blocks(&of_tet, &owners, bands.count);
         let blocks = map(blocks, |mut block: Self| {
             let report = block.simplify_alone(goal, params);

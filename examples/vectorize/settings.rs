@@ -1,0 +1,95 @@
+//! The encoder's settings as options of a command line: a preset, and what is to differ from it.
+
+use clap::{Args, ValueEnum};
+use tetvec::vectorize::simplify::Topology;
+use tetvec::{EncoderConfig, ErrorMetric, LatticeKind, SpeedPreset};
+
+/// Options of the encoder.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Settings {
+    /// Time spent against error reached; the options below override what it sets.
+    #[arg(long, value_enum, default_value_t = Preset::Medium)]
+    preset: Preset,
+    /// Vertices of the mesh over pixels of the source.
+    #[arg(long, default_value_t = 0.01)]
+    simplification_ratio: f64,
+    /// Mean absolute error to simplify up to, in levels; 0: off.
+    #[arg(long, default_value_t = 0.0)]
+    target_error: f64,
+    /// Most frames from one keyframe to the next.
+    #[arg(long, default_value_t = 60)]
+    key_int_max: u32,
+    /// Length of the sliding window in frames.
+    #[arg(long)]
+    window: Option<u32>,
+    /// Mean number of superpixels a frame; 0: chosen by content; 1: no discontinuities.
+    #[arg(long)]
+    superpixels: Option<u32>,
+    /// Levels of subdivision that the stream is to be drawn with.
+    #[arg(long)]
+    subdivision_levels: Option<u8>,
+    /// What the mesh starts from.
+    #[arg(long, value_enum)]
+    lattice: Option<Lattice>,
+    /// Vertices that an adaptive lattice starts with for each that is to be left.
+    #[arg(long)]
+    lattice_density: Option<f64>,
+    /// Steps of the position optimisation.
+    #[arg(long)]
+    position_steps: Option<u32>,
+    /// Use the paper's error metric.
+    #[arg(long)]
+    paper_metric: bool,
+    /// Keep the topology of labels strictly.
+    #[arg(long)]
+    strict: bool,
+    /// Worker threads; 0: all cores.
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Preset {
+    Fast,
+    Medium,
+    Slow,
+    Paper,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Lattice {
+    Adaptive,
+    Dense,
+}
+
+impl Settings {
+    /// The configuration for pictures of this size.
+    pub(crate) fn config(&self, width: u32, height: u32) -> EncoderConfig {
+        let preset = match self.preset {
+            Preset::Fast => SpeedPreset::Fast,
+            Preset::Medium => SpeedPreset::Medium,
+            Preset::Slow => SpeedPreset::Slow,
+            Preset::Paper => SpeedPreset::Paper,
+        };
+        let base = EncoderConfig::new(width, height).with_preset(preset);
+        let lattice = self.lattice.map(|lattice| match lattice {
+            Lattice::Adaptive => LatticeKind::Adaptive,
+            Lattice::Dense => LatticeKind::Dense,
+        });
+        EncoderConfig {
+            simplification_ratio: self.simplification_ratio,
+            target_error: self.target_error,
+            key_int_max: self.key_int_max,
+            window: self.window.unwrap_or(base.window),
+            superpixels: self.superpixels.unwrap_or(base.superpixels),
+            subdivision_levels: self.subdivision_levels.unwrap_or(base.subdivision_levels),
+            lattice: lattice.unwrap_or(base.lattice),
+            lattice_density: self.lattice_density.unwrap_or(base.lattice_density),
+            position_steps: self.position_steps.unwrap_or(base.position_steps),
+            error_metric: if self.paper_metric { ErrorMetric::Paper } else { base.error_metric },
+            topology: if self.strict { Topology::Strict } else { base.topology },
+            threads: self.threads,
+            ..base
+        }
+    }
+}
