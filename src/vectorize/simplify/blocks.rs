@@ -45,7 +45,9 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     /// Appends a run as [`WorkMesh::append`] does, after simplifying its blocks.
     pub fn append_simplified(&mut self, run: &TetMesh, goal: BlockGoal, params: &SimplifyParams) -> SimplifyReport {
         let goal = goal.of_one(params.blocks(run.positions.len()));
-        let blocks = map(split(run, params), |block: Block| {
+        let (tets, owners) = split(run, params);
+        let blocks = map(tets, |tets| {
+            let block = cut(run, &tets, &owners);
             let mut mesh = Self::new(self.domain);
             mesh.fill(&block, params);
             let report = mesh.simplify_alone(goal, params);
@@ -55,12 +57,8 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         let mut glued = self.plane(bottom);
         glued.values().for_each(|&vertex| self.vertices[vertex as usize].frozen = true);
         let (first_vertex, first_tet) = (self.vertices.len(), self.tets.len());
-        let mut total = SimplifyReport::default();
-        for (block, report) in blocks {
-            self.absorb(block, &mut glued, params.spread_weight);
-            total.add(&report);
-        }
-        total.vertices_in_window = self.vertices.len() - first_vertex;
+        let total = self.absorb_all(blocks, &mut glued, params.spread_weight);
+        let total = SimplifyReport { vertices_in_window: self.vertices.len() - first_vertex, ..total };
         self.stars = Stars::new(self.vertices.len(), &self.tets);
         // The blocks have seen all faces but those between frozen vertices.
         self.add_surfaces(first_tet, |frozen| frozen == [true; 3], params.surface_weight);
@@ -88,11 +86,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
             (block, report)
         });
         let mut glued = self.vertices.iter().zip(0..).map(|(vertex, number)| (vertex.position, number)).collect();
-        let mut total = SimplifyReport::default();
-        for (block, report) in blocks {
-            self.absorb(block, &mut glued, 0.0);
-            total.add(&report);
-        }
+        let total = self.absorb_all(blocks, &mut glued, 0.0);
         self.stars = Stars::new(self.vertices.len(), &self.tets);
         self.vertices.iter_mut().for_each(|vertex| vertex.frozen = false);
         total
@@ -175,7 +169,9 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
             max_cost: f32::MAX,
             max_error,
         };
-        simplify(self, Unfrozen { low: i32::MIN, high: i32::MAX }, goal, params)
+        let report = simplify(self, Unfrozen { low: i32::MIN, high: i32::MAX }, goal, params);
+        self.compact();
+        report
     }
 
     /// Fills an empty mesh with a block.
@@ -191,6 +187,25 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         self.spread(0, params.spread_weight);
         self.stars = Stars::new(self.vertices.len(), &self.tets);
         self.add_surfaces(0, |frozen| frozen != [true; 3], params.surface_weight);
+    }
+
+    /// Takes over blocks, in the same memory as far as possible.
+    fn absorb_all(
+        &mut self,
+        blocks: Vec<(Self, SimplifyReport)>,
+        glued: &mut HashMap<IVec3, u32>,
+        spread_weight: f32,
+    ) -> SimplifyReport {
+        let added = |of: fn(&Self) -> usize| blocks.iter().map(|(block, _)| of(block)).sum();
+        self.vertices.reserve_exact(added(|block| block.vertices.len()));
+        self.tets.reserve_exact(added(|block| block.tets.len()));
+        self.labels.reserve_exact(self.tets.capacity() - self.labels.len());
+        let mut total = SimplifyReport::default();
+        for (block, report) in blocks {
+            self.absorb(block, glued, spread_weight);
+            total.add(&report);
+        }
+        total
     }
 
     /// Takes over a block; its frozen vertices meet those of the same position in `glued`.
@@ -243,8 +258,8 @@ impl Bands {
     }
 }
 
-/// Cuts a run into bands.
-fn split(run: &TetMesh, params: &SimplifyParams) -> Vec<Block> {
+/// The tets of each band of a run, and which block its vertices are in.
+fn split(run: &TetMesh, params: &SimplifyParams) -> (Vec<Vec<u32>>, Vec<u32>) {
     let bands = Bands { count: params.blocks(run.positions.len()), shift: 0.0, domain: run.domain };
     let of_tet: Vec<u32> = (0..run.tets.len()).map(|tet| bands.of(run.tet_positions(tet))).collect();
     let corners = (0..run.tets.len()).map(|tet| run.tet_vertices(tet).map(|v| v.0));
@@ -259,8 +274,8 @@ fn split(run: &TetMesh, params: &SimplifyParams) -> Vec<Block> {
         }
     }
     let mut tets = vec![Vec::new(); bands.count];
-    (0..run.tets.len()).for_each(|tet| tets[of_tet[tet] as usize].push(tet));
-    map(tets, |tets| cut(run, &tets, &owners))
+    of_tet.iter().zip(0..).for_each(|(&band, tet)| tets[band as usize].push(tet));
+    (tets, owners)
 }
 
 /// The only block that a vertex is in, or [`SHARED`].
@@ -276,13 +291,13 @@ fn owners(vertices: usize, tets: impl Iterator<Item = ([u32; 4], u32)>) -> Vec<u
 }
 
 /// The mesh of some of a run's tets.
-fn cut(run: &TetMesh, tets: &[usize], owners: &[u32]) -> Block {
+fn cut(run: &TetMesh, tets: &[u32], owners: &[u32]) -> Block {
     let mut vertices = HashMap::new();
     let mut wedges = HashMap::new();
     let mut mesh = TetMesh::empty(run.domain);
     let mut frozen = Vec::new();
     for &tet in tets {
-        let corners = run.tets[tet].map(|wedge| {
+        let corners = run.tets[tet as usize].map(|wedge| {
             *wedges.entry(wedge).or_insert_with(|| {
                 let whole = run.wedges[wedge.index()];
                 let vertex = *vertices.entry(whole.vertex).or_insert_with(|| {

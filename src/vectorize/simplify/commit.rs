@@ -26,6 +26,18 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
             }
         }
         self.pack();
+        self.stars = Stars::new(self.vertices.len(), &self.tets);
+    }
+
+    /// Drops what has collapsed, and the stars, before the mesh is put aside.
+    pub(super) fn compact(&mut self) {
+        let mut tets = self.tets.iter();
+        self.labels.retain(|_| tets.next().is_some_and(|tet| tet[0] != NONE));
+        self.tets.retain(|tet| tet[0] != NONE);
+        self.tets.shrink_to_fit();
+        self.labels.shrink_to_fit();
+        self.pack();
+        self.stars = Stars::default();
     }
 
     fn commit_wedge(&mut self, v: u32, label: crate::video::Label, committed: &mut TetMesh) -> WedgeId {
@@ -57,7 +69,6 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         self.pack_overflow(&number);
         retain_numbered(&mut self.vertices, &number);
         retain_numbered(&mut self.committed, &number);
-        self.stars = Stars::new(self.vertices.len(), &self.tets);
     }
 
     fn pack_overflow(&mut self, number: &[u32]) {
