@@ -1,10 +1,11 @@
-//! `tetvecenc`: formats, times, drains, flushes and keyframes.
+//! `tetvecenc`: formats, times, drains, flushes, keyframes, presets and reports.
 
 mod pipeline;
 
 use gst::ClockTime;
 use gst::prelude::*;
 use pipeline::{ENCODER, RATE, encode, init, packets, raw, time_of};
+use tetvec::{EncoderConfig, SpeedPreset};
 
 /// A harness with an encoder of small windows and keyframes every five frames.
 fn harness() -> gst_check::Harness {
@@ -120,7 +121,7 @@ fn frames_without_a_fixed_rate_keep_their_times() {
 fn latency_is_that_of_the_core() {
     let mut harness = harness();
     harness.set_src_caps(caps(24, 16, (25, 1)));
-    let config = tetvec::EncoderConfig { window: 4, key_int_max: 5, ..tetvec::EncoderConfig::new(24, 16) };
+    let config = EncoderConfig { window: 4, key_int_max: 5, ..EncoderConfig::new(24, 16) };
     let frames = tetvec::Encoder::try_new(config).expect("sound settings").latency_frames();
     assert!(frames > 0);
     assert_eq!(harness.query_latency(), Some(time_of(u64::from(frames))));
@@ -280,4 +281,98 @@ fn sizes_beyond_the_limits_are_refused() {
     let caps = caps(side, 16, (25, 1));
     harness.set_src_caps(caps.clone());
     assert_eq!(harness.push(frame(&caps, 0)), Err(gst::FlowError::NotNegotiated));
+}
+
+/// The value of a property as it is written.
+fn written(element: &gst::Element, property: &str) -> String {
+    element.property_value(property).serialize().expect("a value").to_string()
+}
+
+#[test]
+fn the_preset_decides_what_is_not_set() {
+    init();
+    let element = gst::ElementFactory::make("tetvecenc").build().expect("an encoder");
+    assert_eq!(written(&element, "speed-preset"), "medium");
+    let defaults = EncoderConfig::new(1, 1);
+    for (nick, preset) in [
+        ("medium", SpeedPreset::Medium),
+        ("fast", SpeedPreset::Fast),
+        ("slow", SpeedPreset::Slow),
+        ("paper", SpeedPreset::Paper),
+        ("medium", SpeedPreset::Medium),
+    ] {
+        element.set_property_from_str("speed-preset", nick);
+        let config = defaults.clone().with_preset(preset);
+        assert_eq!(element.property::<u32>("window"), config.window, "{nick}");
+        assert_eq!(element.property::<u32>("superpixels"), config.superpixels, "{nick}");
+        assert_eq!(element.property::<u32>("subdivision-levels"), u32::from(config.subdivision_levels), "{nick}");
+        assert_eq!(element.property::<f64>("lattice-density"), config.lattice_density, "{nick}");
+        assert_eq!(element.property::<u32>("position-steps"), config.position_steps, "{nick}");
+        assert_eq!(element.property::<u32>("key-int-max"), defaults.key_int_max, "{nick}");
+        let choices = ["lattice", "topology", "error-metric"].map(|property| written(&element, property));
+        let expected = if nick == "paper" { ["dense", "strict", "paper"] } else { ["adaptive", "free", "colour"] };
+        assert_eq!(choices, expected, "{nick}");
+    }
+}
+
+#[test]
+fn what_is_set_by_itself_wins_before_and_after_the_preset() {
+    init();
+    for settings in ["window=7 topology=strict speed-preset=fast", "speed-preset=fast window=7 topology=strict"] {
+        let element = gst::parse::launch(&format!("tetvecenc {settings}")).expect("an encoder");
+        for preset in ["fast", "slow", "medium"] {
+            element.set_property_from_str("speed-preset", preset);
+            assert_eq!(element.property::<u32>("window"), 7, "{settings}, then {preset}");
+            assert_eq!(written(&element, "topology"), "strict", "{settings}, then {preset}");
+        }
+    }
+}
+
+#[test]
+fn the_core_gets_what_preset_and_properties_say() {
+    init();
+    let fast = EncoderConfig { key_int_max: 600, ..EncoderConfig::new(24, 16) }.with_preset(SpeedPreset::Fast);
+    let longer = EncoderConfig { window: 40, ..fast.clone() };
+    for (settings, config) in [("speed-preset=fast", fast), ("window=40 speed-preset=fast", longer)] {
+        let mut harness = gst_check::Harness::new_parse(&format!("tetvecenc key-int-max=600 {settings}"));
+        harness.set_src_caps(caps(24, 16, (25, 1)));
+        let frames = tetvec::Encoder::try_new(config).expect("sound settings").latency_frames();
+        assert_eq!(harness.query_latency(), Some(time_of(u64::from(frames))), "{settings}");
+    }
+}
+
+#[test]
+fn the_application_is_told_how_far_the_encoding_is() {
+    let mut harness = harness();
+    let bus = gst::Bus::new();
+    harness.element().expect("an encoder").set_bus(Some(&bus));
+    let caps = caps(24, 16, (25, 1));
+    harness.set_src_caps(caps.clone());
+    for number in 0..13 {
+        harness.push(frame(&caps, number)).expect("a frame is taken");
+    }
+    harness.push_event(gst::event::Eos::new());
+    let reports: Vec<gst::Structure> =
+        bus.iter_filtered(&[gst::MessageType::Element]).filter_map(|m| m.structure().map(|s| s.to_owned())).collect();
+    assert!(reports.len() >= 2, "with the first packets and at the end");
+    let count = |report: &gst::Structure, field: &str| report.get::<u64>(field).expect("a count");
+    for pair in reports.windows(2) {
+        for field in ["frames-in", "packets-out", "vertices", "time-fit", "collapses", "evaluations"] {
+            assert!(count(&pair[0], field) <= count(&pair[1], field), "{field}: {pair:?}");
+        }
+    }
+    let last = reports.last().expect("a report");
+    assert_eq!(last.name(), "tetvecenc-progress");
+    assert_eq!((count(last, "frames-in"), count(last, "packets-out")), (13, 13));
+    // Three slabs, each a box at least.
+    assert!(count(last, "vertices") >= 3 * 8);
+    let times = ["segment", "lattice", "simplify", "fit", "write"].map(|stage| count(last, &format!("time-{stage}")));
+    assert!(times.iter().sum::<u64>() > 0);
+    assert!(0 < count(last, "collapses") && count(last, "collapses") <= count(last, "evaluations"));
+    let refusals = last.get::<gst::Structure>("refusals").expect("refusals");
+    let mut names: Vec<&str> = refusals.fields().map(|name| name.as_str()).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["extent", "flip", "frozen", "labels", "link", "sides", "sliver"]);
+    assert!((0.0..255.0).contains(&last.get::<f64>("fit-rms").expect("an error")));
+    assert_eq!(last.has_field("memory"), cfg!(target_os = "linux"));
 }

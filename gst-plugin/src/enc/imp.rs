@@ -9,7 +9,7 @@ use gst_video::prelude::*;
 use gst_video::subclass::prelude::*;
 
 use super::picture;
-use super::session::{Ready, Session};
+use super::session::{Batch, Ready, Session};
 use super::settings::Settings;
 use crate::caps;
 
@@ -40,12 +40,12 @@ impl TetvecEnc {
     }
 
     fn start_session(&self, info: &gst_video::VideoInfo) -> Result<Session, gst::LoggableError> {
-        let Settings(config) = self.lock_settings().clone();
+        let config = self.lock_settings().config();
         Session::try_new(config, info)
     }
 
     /// Hands a frame to the encoding at work, or to a new one, and takes what became ready.
-    fn encode(&self, frame: &gst_video::VideoCodecFrame<'_>) -> Result<Vec<Ready>, gst::LoggableError> {
+    fn encode(&self, frame: &gst_video::VideoCodecFrame<'_>) -> Result<Batch, gst::LoggableError> {
         let mut state = self.lock_state();
         let mut session = match (state.session.take(), &state.info) {
             (Some(session), _) => session,
@@ -53,9 +53,9 @@ impl TetvecEnc {
             (None, None) => return Err(gst::loggable_error!(CAT, "A frame before caps")),
         };
         session.send(frame)?;
-        let ready = session.take_ready();
+        let batch = session.take_batch();
         state.session = Some(session);
-        Ok(ready)
+        Ok(batch)
     }
 
     /// Ends the encoding at work, if any, and sends all that it still holds.
@@ -65,18 +65,28 @@ impl TetvecEnc {
             gst::element_imp_error!(self, gst::StreamError::Encode, ("Cannot end the stream"), ["{error}"]);
             gst::FlowError::Error
         })?;
-        self.push(session.take_ready())
+        self.push(session.take_batch())
     }
 
-    /// Sends packets; no lock may be held here.
-    fn push(&self, ready: Vec<Ready>) -> Result<gst::FlowSuccess, gst::FlowError> {
-        for ready in ready {
+    /// Sends packets and the report behind them; no lock may be held here.
+    fn push(&self, batch: Batch) -> Result<gst::FlowSuccess, gst::FlowError> {
+        for ready in batch.packets {
             match ready {
                 Ready::Picture { packet, frame_number } => self.push_picture(packet, frame_number)?,
                 Ready::Index { packet, time } => self.push_index(packet, time)?,
             };
         }
+        if let Some(report) = batch.report {
+            self.tell(report);
+        }
         Ok(gst::FlowSuccess::Ok)
+    }
+
+    /// Tells the log and the application how far the encoding is.
+    fn tell(&self, report: gst::Structure) {
+        gst::info!(CAT, imp = self, "{report}");
+        let obj = self.obj();
+        let _ = obj.post_message(gst::message::Element::builder(report).src(&*obj).build());
     }
 
     fn push_picture(&self, packet: tetvec::Packet, frame_number: u32) -> Result<gst::FlowSuccess, gst::FlowError> {
@@ -208,13 +218,13 @@ impl VideoEncoderImpl for TetvecEnc {
     }
 
     fn handle_frame(&self, mut frame: gst_video::VideoCodecFrame) -> Result<gst::FlowSuccess, gst::FlowError> {
-        let ready = self.encode(&frame).map_err(|error| {
+        let batch = self.encode(&frame).map_err(|error| {
             gst::element_imp_error!(self, gst::StreamError::Encode, ("Cannot encode a frame"), ["{error:?}"]);
             gst::FlowError::Error
         })?;
         Self::release_picture(&mut frame);
         drop(frame);
-        self.push(ready)
+        self.push(batch)
     }
 
     fn finish(&self) -> Result<gst::FlowSuccess, gst::FlowError> {

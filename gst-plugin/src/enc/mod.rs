@@ -4,12 +4,14 @@
 use gst::glib;
 use gst::prelude::*;
 
+mod choices;
 mod imp;
 mod picture;
+mod progress;
 mod session;
 mod settings;
 
-pub(crate) use settings::ErrorMetric;
+use choices::{ErrorMetric, Lattice, SpeedPreset, Topology};
 
 glib::wrapper! {
     /// Vectorizes video.
@@ -17,6 +19,10 @@ glib::wrapper! {
 }
 
 pub(crate) fn register(plugin: &gst::Plugin) -> Result<(), glib::BoolError> {
-    ErrorMetric::static_type().mark_as_plugin_api(gst::PluginAPIFlags::empty());
+    for choice in
+        [SpeedPreset::static_type(), ErrorMetric::static_type(), Lattice::static_type(), Topology::static_type()]
+    {
+        choice.mark_as_plugin_api(gst::PluginAPIFlags::empty());
+    }
     gst::Element::register(Some(plugin), "tetvecenc", gst::Rank::PRIMARY, TetvecEnc::static_type())
 }

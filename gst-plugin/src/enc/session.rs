@@ -1,4 +1,5 @@
-//! One encoding, from caps to caps or end: the core's encoder, and which of GStreamer's frames its packets belong to.
+//! One encoding, from caps to caps or end: the core's encoder, which of GStreamer's frames its packets belong to, and how
+//! far it is.
 //!
 //! Forbidden here: pads, pushes. What is ready is handed out, so that the caller can push it without a lock.
 
@@ -11,6 +12,7 @@ use tetvec::{EncodeError, Encoder, EncoderConfig, Packet};
 
 use super::imp::CAT;
 use super::picture::Copier;
+use super::progress::Progress;
 use crate::caps;
 
 /// Rate that the latency is counted with where the stream has none.
@@ -25,11 +27,19 @@ pub(super) enum Ready {
     Index { packet: Packet, time: Option<ClockTime> },
 }
 
+/// What is ready, and what to tell the application behind it, if it is time to.
+#[derive(Debug)]
+pub(super) struct Batch {
+    pub(super) packets: Vec<Ready>,
+    pub(super) report: Option<gst::Structure>,
+}
+
 /// An encoder at work.
 #[derive(Debug)]
 pub(super) struct Session {
     copier: Copier,
     encoder: Encoder,
+    progress: Progress,
     /// System numbers of the frames whose packets have not come yet, in order.
     pending: VecDeque<u32>,
     /// Where the last frame ended.
@@ -39,7 +49,7 @@ pub(super) struct Session {
 impl Session {
     /// Starts encoding pictures of `info`.
     pub(super) fn try_new(settings: EncoderConfig, info: &gst_video::VideoInfo) -> Result<Self, gst::LoggableError> {
-        let encoder = Encoder::try_new(EncoderConfig {
+        let mut encoder = Encoder::try_new(EncoderConfig {
             width: info.width(),
             height: info.height(),
             frame_rate: caps::to_core(info.fps(), Fraction { numerator: 0, denominator: 1 }),
@@ -47,7 +57,8 @@ impl Session {
             ..settings
         })
         .map_err(|error| gst::loggable_error!(CAT, "{error}"))?;
-        Ok(Self { copier: Copier::try_new(info)?, encoder, pending: VecDeque::new(), end: None })
+        let progress = Progress::of(&mut encoder);
+        Ok(Self { copier: Copier::try_new(info)?, encoder, progress, pending: VecDeque::new(), end: None })
     }
 
     /// Caps of the packets.
@@ -73,6 +84,7 @@ impl Session {
         let picture = self.copier.copy(buffer)?;
         let force = frame.flags().contains(gst_video::VideoCodecFrameFlags::FORCE_KEYFRAME);
         self.encoder.send_frame(picture, force).map_err(|error| gst::loggable_error!(CAT, "{error}"))?;
+        self.progress.count_frame();
         self.pending.push_back(frame.system_frame_number());
         self.end = frame.pts().and_then(|start| start.checked_add(frame.duration().unwrap_or(ClockTime::ZERO)));
         Ok(())
@@ -83,13 +95,22 @@ impl Session {
         self.encoder.finish()
     }
 
-    /// The packets that are ready, in order.
-    pub(super) fn take_ready(&mut self) -> Vec<Ready> {
+    /// The packets that are ready, in order. A report comes with some of them: not too often, and with the last.
+    pub(super) fn take_batch(&mut self) -> Batch {
+        let packets = self.take_ready();
+        let ended = matches!(packets.last(), Some(Ready::Index { .. }));
+        let due = ended || (!packets.is_empty() && self.progress.is_due());
+        let report = due.then(|| self.progress.report(self.encoder.vertices()));
+        Batch { packets, report }
+    }
+
+    fn take_ready(&mut self) -> Vec<Ready> {
         let mut ready = Vec::new();
         while let Some(packet) = self.encoder.receive_packet() {
             if !packet.picture {
                 ready.push(Ready::Index { packet, time: self.end });
             } else if let Some(frame_number) = self.pending.pop_front() {
+                self.progress.count_packet();
                 ready.push(Ready::Picture { packet, frame_number });
             }
         }
