@@ -64,7 +64,7 @@ impl Clip {
 
 fn hash(n: u32) -> u32 {
     let n = n.wrapping_mul(0x9E37_79B9);
-    (n ^ n >> 15).wrapping_mul(0x85EB_CA6B) >> 13
+    (n ^ (n >> 15)).wrapping_mul(0x85EB_CA6B) >> 13
 }
 
 /// A few bright points on black: strong local refinement anywhere.
@@ -95,7 +95,7 @@ proptest! {
         block in 1u32..=9,
     ) {
         let planes = layers.iter().sum::<u32>() + 1;
-        let label = |x: u32, y: u32, t: u32| hash(hash(hash(x / block ^ seed) ^ y / block) ^ t / block) % 3;
+        let label = |x: u32, y: u32, t: u32| hash(hash(hash((x / block) ^ seed) ^ (y / block)) ^ (t / block)) % 3;
         let clip = Clip::new([size[0], size[1], planes], points(seed), label);
         let mesh = clip.mesh(&layers, 0.02);
         prop_assert_eq!(validate(&mesh), Ok(()));

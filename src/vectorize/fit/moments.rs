@@ -257,7 +257,7 @@ impl Edge {
     /// Where the line of height `y` crosses it; ends count above, not below.
     #[inline]
     fn crossing(&self, y: f64) -> Option<f64> {
-        (self.start.y <= y && y < self.end).then(|| self.start.x + (y - self.start.y) * self.slope)
+        (self.start.y <= y && y < self.end).then_some(self.start.x + (y - self.start.y) * self.slope)
     }
 }
 

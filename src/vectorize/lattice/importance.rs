@@ -99,13 +99,13 @@ impl Importance {
         for z in (0..planes).step_by(step) {
             for y in (0..lines).step_by(step) {
                 // Along x every second vertex has the right number of odd coordinates, or none has.
-                let first = match odd - (z / step & 1) as i32 - (y / step & 1) as i32 {
+                let first = match odd - ((z / step) & 1) as i32 - ((y / step) & 1) as i32 {
                     1 => step,
                     0 => 0,
                     _ => continue,
                 };
                 for x in (first..columns).step_by(2 * step) {
-                    let pattern = (x / step & 1) | (y / step & 1) << 1 | (z / step & 1) << 2;
+                    let pattern = ((x / step) & 1) | (((y / step) & 1) << 1) | (((z / step) & 1) << 2);
                     let mut most = self.planes[z][y * columns + x];
                     for &[dx, dy, dz] in &offsets[pattern] {
                         let at = [x.wrapping_add_signed(dx), y.wrapping_add_signed(dy), z.wrapping_add_signed(dz)];
@@ -169,7 +169,7 @@ impl Importance {
 fn diagonal(vertex: [usize; 3], step: usize) -> [[usize; 3]; 2] {
     let (mut low, mut high) = (vertex, vertex);
     for axis in 0..3 {
-        if vertex[axis] / step & 1 == 1 {
+        if (vertex[axis] / step) & 1 == 1 {
             let (before, after) = (vertex[axis] - step, vertex[axis] + step);
             let is_outer = step == CELL / 2 || before.is_multiple_of(4 * step);
             (low[axis], high[axis]) = if is_outer { (before, after) } else { (after, before) };
