@@ -6,10 +6,9 @@
 
 use glam::Vec3;
 
+use super::evidence::Evidence;
 use super::model::Model;
-use super::moments::Moments;
 use super::normal::NormalEquations;
-use super::parallel;
 use super::sparse::conjugate_gradient;
 use super::{COLOR_RANGE, FitParams};
 
@@ -32,9 +31,9 @@ impl Colors {
     }
 
     /// `iterations` steps of conjugate gradients towards the least squared error.
-    pub(super) fn optimize(&mut self, model: &Model, moments: &[Moments], iterations: u32, params: &FitParams) {
+    pub(super) fn optimize(&mut self, model: &Model, evidence: &Evidence, iterations: u32, params: &FitParams) {
         let damping = vec![params.color_anchor; self.now.len()];
-        let system = NormalEquations::of_colors(model, moments, self.mask.clone(), damping);
+        let system = NormalEquations::of_colors(model, evidence, self.mask.clone(), damping);
         let nodes = model.node_colors(&self.now);
         let rhs = system.right_hand_side(&nodes, |w| self.anchor[w] - self.now[w]);
         let change = conjugate_gradient(&system, rhs, iterations, params.tolerance);
@@ -58,20 +57,6 @@ impl Colors {
             *now = (*now / step).round().clamp(Vec3::splat(limit[0]), Vec3::splat(limit[1])) * step;
         }
     }
-}
-
-/// The squared error over all measured pixels and channels.
-pub(super) fn squared_error(model: &Model, moments: &[Moments], wedge_colors: &[Vec3]) -> f64 {
-    let nodes = model.node_colors(wedge_colors);
-    parallel::sum(moments.len(), |m| {
-        let tet = model.tets[moments[m].tet as usize];
-        moments[m].energy(tet.map(|n| nodes[n as usize]))
-    })
-}
-
-/// Number of pixels measured.
-pub(super) fn pixel_count(moments: &[Moments]) -> u64 {
-    moments.iter().map(|m| u64::from(m.pixels)).sum()
 }
 
 fn clamp(color: Vec3) -> Vec3 {

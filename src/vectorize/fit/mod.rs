@@ -11,7 +11,11 @@
 
 mod boundary;
 mod color;
+mod edges;
+mod evidence;
 mod guard;
+mod interface;
+mod marks;
 mod model;
 mod moments;
 mod normal;
@@ -19,6 +23,8 @@ mod parallel;
 mod params;
 mod patch;
 mod pin;
+mod planes;
+mod polygon;
 mod refine;
 mod sparse;
 mod surface;
@@ -31,9 +37,9 @@ pub use pin::{PinReport, pin_folds};
 use crate::mesh::TetMesh;
 use crate::video::{LabelPlane, Volume};
 use boundary::BoundaryPoints;
-use color::{Colors, pixel_count, squared_error};
+use color::Colors;
+use evidence::Evidence;
 use model::Model;
-use moments::{Moments, measure};
 use patch::Patch;
 
 /// Subdivision masks reach one ring, so what a free vertex has a share in lies within one ring of it, and is exact if
@@ -117,19 +123,19 @@ impl<'a> Fitting<'a> {
     }
 
     fn first_colors(&mut self) {
-        let moments = self.measure();
-        self.report.pixels = pixel_count(&moments);
-        self.report.rms_before = self.rms(&moments);
-        self.colors.optimize(&self.model, &moments, self.params.color_iterations, self.params);
-        self.report.rms_colors = self.rms(&moments);
+        let evidence = self.gather();
+        self.report.pixels = evidence.pixels();
+        self.report.rms_before = self.rms(&evidence);
+        self.colors.optimize(&self.model, &evidence, self.params.color_iterations, self.params);
+        self.report.rms_colors = self.rms(&evidence);
     }
 
     fn positions(&mut self) {
         let (patch, model, colors) = (&mut self.patch, &self.model, &mut self.colors);
-        let (moments, refined) = refine::optimize_positions(patch, model, colors, self.frames, self.params);
+        let (evidence, refined) = refine::optimize_positions(patch, model, colors, self.frames, self.params);
         self.report.position_steps = refined.steps;
         self.report.refused_moves += refined.refused;
-        self.report.rms_positions = self.rms(&moments);
+        self.report.rms_positions = self.rms(&evidence);
         self.follow_positions();
     }
 
@@ -153,10 +159,10 @@ impl<'a> Fitting<'a> {
     }
 
     fn final_colors(&mut self) {
-        let moments = self.measure();
-        self.colors.optimize(&self.model, &moments, self.params.color_iterations, self.params);
+        let evidence = self.gather();
+        self.colors.optimize(&self.model, &evidence, self.params.color_iterations, self.params);
         self.colors.quantize(self.params.color_step);
-        self.report.rms_after = self.rms(&moments);
+        self.report.rms_after = self.rms(&evidence);
     }
 
     fn finish(mut self, mesh: &mut TetMesh) -> FitReport {
@@ -170,13 +176,13 @@ impl<'a> Fitting<'a> {
         self.model = Model::new(&self.patch.mesh, &self.patch.free, self.params.subdivision_levels);
     }
 
-    fn measure(&self) -> Vec<Moments> {
+    fn gather(&self) -> Evidence {
         let points = self.model.points(&self.patch.mesh.positions);
-        measure(&self.model, &points, &self.model.node_colors(&self.colors.now), self.frames)
+        Evidence::gather(&self.model, &points, &self.model.node_colors(&self.colors.now), self.frames)
     }
 
-    fn rms(&self, moments: &[Moments]) -> f64 {
-        let values = (3 * pixel_count(moments)).max(1);
-        (squared_error(&self.model, moments, &self.colors.now) / values as f64).sqrt()
+    fn rms(&self, evidence: &Evidence) -> f64 {
+        let values = (3 * evidence.pixels()).max(1);
+        (evidence.squared_error(&self.model, &self.colors.now) / values as f64).sqrt()
     }
 }

@@ -6,6 +6,7 @@
 
 use glam::{DVec3, IVec3, Vec3};
 
+use super::interface::{Interface, find_interfaces};
 use super::parallel;
 use super::sparse::Sparse;
 use crate::mesh::{Domain, TetMesh};
@@ -25,6 +26,8 @@ pub(super) struct Model {
     pub(super) node_label: Vec<Label>,
     /// Fine tets that depend on something free, over nodes.
     pub(super) tets: Vec<[u32; 4]>,
+    /// Faces between labels of these tets.
+    pub(super) interfaces: Vec<Interface>,
     /// Node colours from wedge colours, and back.
     pub(super) colors: Sparse,
     pub(super) colors_back: Sparse,
@@ -48,12 +51,15 @@ impl Model {
             moves[node_point[node] as usize] || shares(&colors, node, &free_wedges)
         });
         let depends = |tet: &[u32; 4]| tet.iter().any(|&n| active[n as usize]);
+        let node_label: Vec<Label> = refined.nodes.iter().map(|node| node.label).collect();
+        let tets: Vec<[u32; 4]> = refined.tets.into_iter().filter(depends).collect();
         Self {
             domain: mesh.domain,
             fine_unit: mesh.domain.unit() << FINE_BITS,
-            tets: refined.tets.into_iter().filter(depends).collect(),
+            interfaces: find_interfaces(&tets, &node_point, &node_label),
+            tets,
             node_point,
-            node_label: refined.nodes.iter().map(|node| node.label).collect(),
+            node_label,
             colors_back: colors.transposed(),
             colors,
             positions_back: positions.transposed(),

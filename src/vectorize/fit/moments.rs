@@ -5,11 +5,14 @@
 //! A pixel counts where its centre lies in a slice of the tet, in exactly one tet (half-open spans whose ends are
 //! computed from each edge in one direction); inverted tets count nothing, since they are drawn over.
 
-use glam::{DVec2, DVec3, IVec3, Mat3, Vec3, Vec4};
+use glam::{DVec3, IVec3, Mat3, Vec3, Vec4};
 
+use super::edges::Piece;
+use super::marks::Marks;
 use super::model::Model;
 use super::parallel;
-use crate::video::Volume;
+use super::planes::Planes;
+use super::polygon::{FLAT, Polygon, Weights};
 
 /// Sums over the pixels of one fine tet. phi are the weights (barycentric coordinates) of a pixel's centre, and
 /// colours are taken relative to `reference`, so that sums of squares stay exact enough in f32.
@@ -65,22 +68,36 @@ impl Moments {
 /// Fine tets that one worker takes at a time.
 const TETS_PER_TASK: usize = 512;
 
-/// The moments of all of the model's tets that cover a pixel of `frames`, in the order of the tets.
-/// `points` are the model's points (its fine units), `colors` the nodes' colours (only to choose references by).
-pub(super) fn measure(model: &Model, points: &[IVec3], colors: &[Vec3], frames: &Volume) -> Vec<Moments> {
-    let planes = Planes::new(model, frames);
+/// What tets are looked at with.
+pub(super) struct View<'a> {
+    pub(super) planes: Planes<'a>,
+    /// Pixels that are taken whole and not at their centres.
+    pub(super) marks: &'a Marks,
+}
+
+/// The moments of all of the model's tets that cover a pixel that is not marked, in the order of the tets; and of the
+/// marked pixels the parts that tets cover, each with the pixel's number. `points` are the model's points (its fine
+/// units), `colors` the nodes' colours (only to choose references by).
+pub(super) fn measure(
+    model: &Model,
+    points: &[IVec3],
+    colors: &[Vec3],
+    view: &View<'_>,
+) -> (Vec<Moments>, Vec<(u32, Piece)>) {
     let task = |task: usize| {
         let range = task * TETS_PER_TASK..((task + 1) * TETS_PER_TASK).min(model.tets.len());
-        let mut found = Vec::new();
+        let (mut found, mut pieces) = (Vec::new(), Vec::new());
         for tet in range {
             let nodes = model.tets[tet].map(|n| n as usize);
             let corners = nodes.map(|n| points[model.node_point[n] as usize]);
             let reference = nodes.iter().map(|&n| colors[n]).sum::<Vec3>() * 0.25;
-            found.extend(planes.moments(tet as u32, corners, reference));
+            found.extend(observe_tet(view, tet as u32, corners, reference, &mut pieces));
         }
-        found
+        (found, pieces)
     };
-    parallel::map(model.tets.len().div_ceil(TETS_PER_TASK), task).concat()
+    let parts = parallel::map(model.tets.len().div_ceil(TETS_PER_TASK), task);
+    let (moments, pieces): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+    (moments.concat(), pieces.concat())
 }
 
 /// The gradient of colour inside a tet with corners `p` (fine units) and corner colours `c`: maps a displacement in
@@ -97,177 +114,51 @@ pub(super) fn color_gradient(p: [IVec3; 4], c: [Vec3; 4], fine_unit: f32) -> Mat
     Mat3::from_cols(column(0), column(1), column(2))
 }
 
-/// Six times the volume (cubic pixels) below which a tet counts as flat: far below the smallest tet of any lattice
-/// that the stream allows, far above the rounding of f64 at coordinates of 8192.
-const FLAT: f64 = 1e-7;
-
-/// The slices at which the frames lie.
-struct Planes<'a> {
-    frames: &'a Volume,
-    /// Fine units in a pixel or a frame.
-    unit: f64,
-    /// The plane of the slab's first frame, in frames: half a lattice unit, as the renderer clamps it.
-    first: f64,
-    /// The slab's end, in frames.
-    end: f64,
-}
-
-impl<'a> Planes<'a> {
-    fn new(model: &Model, frames: &'a Volume) -> Self {
-        let half_lattice_unit = 0.5 / f64::from(model.domain.unit());
-        let end = f64::from(model.domain.duration);
-        Self { frames, unit: f64::from(model.fine_unit), first: half_lattice_unit, end }
+/// The moments of one tet, and the parts of edge pixels that it covers.
+fn observe_tet(
+    view: &View<'_>,
+    tet: u32,
+    corners: [IVec3; 4],
+    reference: Vec3,
+    pieces: &mut Vec<(u32, Piece)>,
+) -> Option<Moments> {
+    let planes = &view.planes;
+    let p = corners.map(|c| planes.to_px(c));
+    let range = planes.range(&p);
+    if range.is_empty() {
+        return None;
     }
-
-    fn moments(&self, tet: u32, corners: [IVec3; 4], reference: Vec3) -> Option<Moments> {
-        let p = corners.map(|c| c.as_dvec3() / self.unit);
-        let low = p.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
-        let high = p.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max);
-        let first = if low < self.first { 0.0 } else { low.ceil() };
-        let last = high.floor().min(self.end);
-        let range = (first as u32).max(self.frames.first())..(last as u32 + 1).min(self.frames.end());
-        if range.is_empty() || high < self.first {
-            return None;
-        }
-        let weights = Weights::new(p)?;
-        let mut sums = Sums::default();
-        for k in range {
-            let plane = f64::from(k).max(self.first);
-            if let Some(frame) = self.frames.frame(k) {
-                let polygon = Polygon::slice(p, plane);
-                polygon.spans(frame.width(), frame.height(), |y, from, to| {
-                    let row = &frame.row(y)[from as usize..to as usize];
-                    sums.add(
-                        row,
-                        weights.at(DVec3::new(f64::from(from) + 0.5, f64::from(y) + 0.5, plane)),
-                        reference,
-                        weights.along_x,
-                    );
-                });
-            }
-        }
-        sums.finish(tet, reference)
-    }
-}
-
-/// The four barycentric coordinates as affine functions of (x, y, t).
-struct Weights {
-    origin: DVec3,
-    gradient: [DVec3; 3],
-    along_x: Vec4,
-}
-
-impl Weights {
-    /// None for a flat or inverted tet.
-    fn new(p: [DVec3; 4]) -> Option<Self> {
-        let (u, v, w) = (p[1] - p[0], p[2] - p[0], p[3] - p[0]);
-        let volume6 = u.cross(v).dot(w);
-        if volume6 < FLAT {
-            return None;
-        }
-        let gradient = [v.cross(w), w.cross(u), u.cross(v)].map(|g| g / volume6);
-        let [b, c, d] = gradient.map(|g| g.x as f32);
-        Some(Self { origin: p[0], gradient, along_x: Vec4::new(-b - c - d, b, c, d) })
-    }
-
-    fn at(&self, x: DVec3) -> Vec4 {
-        let [b, c, d] = self.gradient.map(|g| g.dot(x - self.origin) as f32);
-        Vec4::new(1.0 - b - c - d, b, c, d)
-    }
-}
-
-/// A slice of a tet: a convex polygon of three or four corners, or nothing.
-struct Polygon {
-    corners: [DVec2; 4],
-    len: usize,
-}
-
-impl Polygon {
-    /// Slices at time `t`; a corner is above when its time is >= t.
-    fn slice(p: [DVec3; 4], t: f64) -> Self {
-        let mut order = [0usize; 4];
-        let (mut below, mut above) = (0, 4);
-        for (i, p) in p.iter().enumerate() {
-            if p.z >= t {
-                above -= 1;
-                order[above] = i;
-            } else {
-                order[below] = i;
-                below += 1;
-            }
-        }
-        let cut = |b: usize, a: usize| {
-            let (b, a) = (p[order[b]], p[order[a]]);
-            let s = (t - b.z) / (a.z - b.z);
-            b.truncate() + (a.truncate() - b.truncate()) * s
+    let weights = Weights::new(p)?;
+    let mut sums = Sums::default();
+    for k in range {
+        let Some(frame) = planes.frames.frame(k) else { continue };
+        let plane = planes.time(k);
+        let polygon = Polygon::slice(p, plane);
+        let mut add = |y: u32, from: u32, to: u32| {
+            let start = weights.at(DVec3::new(f64::from(from) + 0.5, f64::from(y) + 0.5, plane));
+            sums.add(&frame.row(y)[from as usize..to as usize], start, reference, weights.along_x);
         };
-        match below {
-            1 => Self { corners: [cut(0, 1), cut(0, 2), cut(0, 3), DVec2::ZERO], len: 3 },
-            2 => Self { corners: [cut(0, 2), cut(0, 3), cut(1, 3), cut(1, 2)], len: 4 },
-            3 => Self { corners: [cut(0, 3), cut(1, 3), cut(2, 3), DVec2::ZERO], len: 3 },
-            _ => Self { corners: [DVec2::ZERO; 4], len: 0 },
-        }
-    }
-
-    /// Calls `span(y, from, to)` for every row of pixels whose centres the polygon holds.
-    fn spans(&self, width: u32, height: u32, mut span: impl FnMut(u32, u32, u32)) {
-        let corners = &self.corners[..self.len];
-        let low = corners.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
-        let high = corners.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
-        let rows = first_centre(low, height)..first_centre(high, height);
-        if rows.is_empty() {
-            return;
-        }
-        let mut edges = [Edge::default(); 4];
-        for (n, edge) in edges[..self.len].iter_mut().enumerate() {
-            *edge = Edge::new(corners[n], corners[(n + 1) % self.len]);
-        }
-        for y in rows {
-            let centre = f64::from(y) + 0.5;
-            let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
-            for edge in &edges[..self.len] {
-                if let Some(x) = edge.crossing(centre) {
-                    left = left.min(x);
-                    right = right.max(x);
+        let Some(marks) = view.marks.frame(k) else {
+            polygon.spans(frame.width(), frame.height(), add);
+            continue;
+        };
+        polygon.spans(frame.width(), frame.height(), |y, from, to| {
+            marks.unmarked(y, from..to, |run| add(y, run.start, run.end))
+        });
+        for y in polygon.rows(frame.height()) {
+            if !marks.any_in_row(y) {
+                continue;
+            }
+            let strip = polygon.strip(y);
+            marks.marked(y, strip.columns(frame.width()), |x, row| {
+                if let Some((area, centre)) = strip.in_column(x) {
+                    let share = weights.at(centre.extend(plane)) * area as f32;
+                    pieces.push((row, Piece { tet, share }));
                 }
-            }
-            let (from, to) = (first_centre(left, width), first_centre(right, width));
-            if from < to {
-                span(y, from, to);
-            }
+            });
         }
     }
-}
-
-/// An edge of a slice, from its upper end down: all who share it compute the same crossings.
-#[derive(Debug, Clone, Copy, Default)]
-struct Edge {
-    start: DVec2,
-    end: f64,
-    slope: f64,
-}
-
-impl Edge {
-    fn new(p: DVec2, q: DVec2) -> Self {
-        let (p, q) = if (p.y, p.x) <= (q.y, q.x) { (p, q) } else { (q, p) };
-        // Without a height it crosses no line, whatever the slope.
-        Self { start: p, end: q.y, slope: (q.x - p.x) / (q.y - p.y) }
-    }
-
-    /// Where the line of height `y` crosses it; ends count above, not below.
-    #[inline]
-    fn crossing(&self, y: f64) -> Option<f64> {
-        (self.start.y <= y && y < self.end).then_some(self.start.x + (y - self.start.y) * self.slope)
-    }
-}
-
-/// The first pixel of 0..len whose centre is at or beyond `x`; len if none. (NaN and infinities give an end.)
-#[inline]
-fn first_centre(x: f64, len: u32) -> u32 {
-    // Clamped before it is rounded up by hand: a call of `ceil` costs more than the rest.
-    let shifted = (x - 0.5).clamp(0.0, f64::from(len));
-    let whole = shifted as u32;
-    whole + u32::from(f64::from(whole) < shifted)
+    sums.finish(tet, reference)
 }
 
 /// The sums while they grow, four corners to a vector.

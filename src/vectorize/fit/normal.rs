@@ -3,15 +3,16 @@
 //! In: a model, its points and colours, and what the frames say about its tets. Out: the Gauss-Newton system, known
 //! by products only, and its right-hand side. Inside a tet with colour gradient C a displacement d of corner i
 //! changes a pixel's colour by -phi_i C d, and a change f of the corner's colour changes it by phi_i f; with
-//! u_i = f_i - C d_i both go through the same moments. A jump between labels adds no term: where a boundary lies is
-//! known only through the colours on its two sides.
+//! u_i = f_i - C d_i both go through the same moments. Pixels that a boundary passes have terms of their own (`edges`).
 
 use std::ops::AddAssign;
 
 use glam::{IVec3, Mat3, Vec3};
 
+use super::edges::Slopes;
+use super::evidence::Evidence;
 use super::model::Model;
-use super::moments::{Moments, color_gradient};
+use super::moments::color_gradient;
 use super::parallel;
 use super::sparse::System;
 
@@ -31,7 +32,7 @@ pub(super) struct PositionDamping {
 /// move, one per vertex after these (displacement in pixels and frames).
 pub(super) struct NormalEquations<'a> {
     model: &'a Model,
-    moments: &'a [Moments],
+    evidence: &'a Evidence,
     /// 1 for components that may change, 0 for others.
     mask: Vec<Vec3>,
     /// Added to the diagonal, per entry of a vector.
@@ -40,42 +41,57 @@ pub(super) struct NormalEquations<'a> {
     color_inverse: Vec<f32>,
     /// Inverse of the vertices' diagonal blocks; empty where positions are held.
     position_inverse: Vec<Mat3>,
-    /// Colour gradients of the tets of `moments`; empty where positions are held.
+    /// None where positions are held.
+    motion: Option<Motion>,
+}
+
+/// How colours answer to displacements.
+struct Motion {
+    /// Colour gradients of the model's tets.
     gradients: Vec<Mat3>,
+    /// How boundaries answer.
+    slopes: Slopes,
+    /// Colours of the nodes.
+    nodes: Vec<Vec3>,
 }
 
 impl<'a> NormalEquations<'a> {
     /// Colours alone. `mask` and `damping` (in pixels) have an entry per wedge.
-    pub(super) fn of_colors(model: &'a Model, moments: &'a [Moments], mask: Vec<Vec3>, damping: Vec<f32>) -> Self {
-        let (position_inverse, gradients) = (Vec::new(), Vec::new());
-        let color_inverse = Vec::new();
-        let mut system = Self { model, moments, mask, damping, color_inverse, position_inverse, gradients };
+    pub(super) fn of_colors(model: &'a Model, evidence: &'a Evidence, mask: Vec<Vec3>, damping: Vec<f32>) -> Self {
+        let (color_inverse, position_inverse) = (Vec::new(), Vec::new());
+        let mut system = Self { model, evidence, mask, damping, color_inverse, position_inverse, motion: None };
         system.color_inverse = system.invert_color_diagonal();
         system
     }
 
     /// Colours and positions together. `mask` has an entry per wedge, then one per vertex.
     pub(super) fn of_colors_and_positions(
-        (model, moments): (&'a Model, &'a [Moments]),
+        (model, evidence): (&'a Model, &'a Evidence),
         (points, node_colors): (&[IVec3], &[Vec3]),
         mask: Vec<Vec3>,
         color_damping: Vec<f32>,
         position_damping: &PositionDamping,
     ) -> Self {
-        let mut system = Self::of_colors(model, moments, mask, color_damping);
-        system.gradients = parallel::map(moments.len(), |m| {
-            let tet = moments[m].tet as usize;
+        let mut system = Self::of_colors(model, evidence, mask, color_damping);
+        let gradients = parallel::map(model.tets.len(), |tet| {
             let corners = model.tet_points(tet).map(|p| points[p]);
             color_gradient(corners, model.tets[tet].map(|n| node_colors[n as usize]), model.fine_unit as f32)
         });
-        system.damp_and_invert_positions(position_damping);
+        let slopes = Slopes::new(&model.interfaces, points);
+        let motion = Motion { gradients, slopes, nodes: node_colors.to_vec() };
+        system.damp_and_invert_positions(&motion, position_damping);
+        system.motion = Some(motion);
         system
     }
 
     /// The right-hand side, for nodes of these colours: minus half the gradient of the squared error, and for wedge w
     /// its damping times `pull(w)`, the way from its colour to the one it would have if no pixel spoke.
     pub(super) fn right_hand_side(&self, node_colors: &[Vec3], pull: impl Fn(usize) -> Vec3) -> Vec<Vec3> {
-        let mut out = self.adjoint(|m| self.moments[m].residual(self.corner_values(m, node_colors)));
+        let moments = &self.evidence.moments;
+        let mut out = self.adjoint(
+            |m| moments[m].residual(self.corner_values(m, node_colors)),
+            |row| self.evidence.edges.residual(row, self.model, node_colors),
+        );
         for (wedge, out) in out.iter_mut().enumerate().take(self.wedges()) {
             *out += pull(wedge) * self.damping[wedge] * self.mask[wedge];
         }
@@ -83,30 +99,46 @@ impl<'a> NormalEquations<'a> {
     }
 
     fn corner_values(&self, moment: usize, node_values: &[Vec3]) -> [Vec3; 4] {
-        self.model.tets[self.moments[moment].tet as usize].map(|n| node_values[n as usize])
+        self.model.tets[self.evidence.moments[moment].tet as usize].map(|n| node_values[n as usize])
     }
 
     fn wedges(&self) -> usize {
         self.model.colors_back.rows()
     }
 
-    /// Carries what `corner_change(m)` finds at the corners of each measured tet back to wedges and vertices.
-    fn adjoint(&self, corner_change: impl Fn(usize) -> [Vec3; 4] + Sync) -> Vec<Vec3> {
+    /// Carries what `corner_change(m)` finds at the corners of each measured tet, and `change(row)` in each edge pixel,
+    /// back to wedges and vertices.
+    fn adjoint(
+        &self,
+        corner_change: impl Fn(usize) -> [Vec3; 4] + Sync + Send,
+        change: impl Fn(usize) -> Vec3 + Sync + Send,
+    ) -> Vec<Vec3> {
         let (model, nodes) = (self.model, self.model.node_point.len());
-        let points = if self.gradients.is_empty() { 0 } else { model.positions.rows() };
-        let sums = collect(self.moments.len(), nodes + points, |m, out: &mut [Vec3]| {
-            let tet = self.moments[m].tet as usize;
+        let (moments, edges) = (&self.evidence.moments, &self.evidence.edges);
+        let points = if self.motion.is_none() { 0 } else { model.positions.rows() };
+        let mut sums = collect(moments.len(), nodes + points, |m, out: &mut [Vec3]| {
+            let tet = moments[m].tet as usize;
             let change = corner_change(m);
             for (corner, &node) in model.tets[tet].iter().enumerate() {
                 out[node as usize] += change[corner];
             }
-            if let Some(gradient) = self.gradients.get(m) {
-                let transposed = gradient.transpose();
+            if let Some(motion) = &self.motion {
+                let transposed = motion.gradients[tet].transpose();
                 for (corner, point) in model.tet_points(tet).into_iter().enumerate() {
                     out[nodes + point] -= transposed * change[corner];
                 }
             }
         });
+        if edges.len() > 0 {
+            let more = collect(edges.len(), nodes + points, |row, out: &mut [Vec3]| {
+                let change = change(row);
+                edges.color_terms(row, model, |node, weight| out[node] += change * weight);
+                if let Some(motion) = &self.motion {
+                    motion.terms(row, self, |point, matrix| out[nodes + point] += matrix.transpose() * change);
+                }
+            });
+            sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+        }
         let mut out = model.colors_back.times(&sums[..nodes]);
         if points > 0 {
             out.extend(model.positions_back.times(&sums[nodes..]));
@@ -117,24 +149,43 @@ impl<'a> NormalEquations<'a> {
 
     /// Approximates the diagonal by the tets' own diagonals through squared weights.
     fn invert_color_diagonal(&self) -> Vec<f32> {
-        let nodes = collect(self.moments.len(), self.model.node_point.len(), |m, out: &mut [f32]| {
-            for (corner, &node) in self.model.tets[self.moments[m].tet as usize].iter().enumerate() {
-                out[node as usize] += self.moments[m].diagonal(corner);
+        let (model, count) = (self.model, self.model.node_point.len());
+        let (moments, edges) = (&self.evidence.moments, &self.evidence.edges);
+        let mut nodes = collect(moments.len(), count, |m, out: &mut [f32]| {
+            for (corner, &node) in model.tets[moments[m].tet as usize].iter().enumerate() {
+                out[node as usize] += moments[m].diagonal(corner);
             }
         });
+        if edges.len() > 0 {
+            let more = collect(edges.len(), count, |row, out: &mut [f32]| {
+                let mut weights = Terms::<f32>::default();
+                edges.color_terms(row, model, |node, weight| weights.add(node, weight));
+                weights.for_each(|node, weight| out[node] += weight * weight);
+            });
+            nodes.iter_mut().zip(more).for_each(|(node, more)| *node += more);
+        }
         let diagonal = |wedge: usize| self.model.colors_back.row(wedge).map(|(n, w)| w * w * nodes[n]).sum::<f32>();
         parallel::map(self.wedges(), |wedge| 1.0 / (diagonal(wedge) + self.damping[wedge]).max(f32::MIN_POSITIVE))
     }
 
-    fn damp_and_invert_positions(&mut self, damping: &PositionDamping) {
+    fn damp_and_invert_positions(&mut self, motion: &Motion, damping: &PositionDamping) {
         let (model, wedges) = (self.model, self.wedges());
-        let points = collect(self.moments.len(), model.positions.rows(), |m, out: &mut [Block]| {
-            let gradient = &self.gradients[m];
-            let block = Block::of(gradient);
-            for (corner, point) in model.tet_points(self.moments[m].tet as usize).into_iter().enumerate() {
-                out[point] += block.scaled(self.moments[m].diagonal(corner));
+        let (moments, edges) = (&self.evidence.moments, &self.evidence.edges);
+        let mut points = collect(moments.len(), model.positions.rows(), |m, out: &mut [Block]| {
+            let tet = moments[m].tet as usize;
+            let block = Block::of(&motion.gradients[tet]);
+            for (corner, point) in model.tet_points(tet).into_iter().enumerate() {
+                out[point] += block.scaled(moments[m].diagonal(corner));
             }
         });
+        if edges.len() > 0 {
+            let more = collect(edges.len(), points.len(), |row, out: &mut [Block]| {
+                let mut matrices = Terms::<Mat3>::default();
+                motion.terms(row, self, |point, matrix| matrices.add(point, matrix));
+                matrices.for_each(|point, matrix| out[point] += Block::of(&matrix));
+            });
+            points.iter_mut().zip(more).for_each(|(point, more)| *point += more);
+        }
         let rows = parallel::map(model.positions_back.rows(), |vertex| {
             let mut block = Block::default();
             model.positions_back.row(vertex).for_each(|(p, w)| block += points[p].scaled(w * w));
@@ -146,19 +197,53 @@ impl<'a> NormalEquations<'a> {
     }
 }
 
+impl Motion {
+    fn terms(&self, row: usize, system: &NormalEquations<'_>, part: impl FnMut(usize, Mat3)) {
+        let motion = (system.model, &self.gradients[..], &self.slopes);
+        system.evidence.edges.position_terms(row, motion, &self.nodes, part);
+    }
+}
+
+/// The terms of one pixel, those of the same unknown added up; they are few.
+#[derive(Default)]
+struct Terms<T>(Vec<(usize, T)>);
+
+impl<T: Copy + AddAssign> Terms<T> {
+    fn add(&mut self, unknown: usize, term: T) {
+        match self.0.iter_mut().find(|(known, _)| *known == unknown) {
+            Some((_, sum)) => *sum += term,
+            None => self.0.push((unknown, term)),
+        }
+    }
+
+    fn for_each(&self, mut each: impl FnMut(usize, T)) {
+        self.0.iter().for_each(|&(unknown, term)| each(unknown, term));
+    }
+}
+
 impl System for NormalEquations<'_> {
     fn times(&self, x: &[Vec3]) -> Vec<Vec3> {
         let (colors, positions) = x.split_at(self.wedges());
         let nodes = self.model.colors.times(colors);
-        let points = if self.gradients.is_empty() { Vec::new() } else { self.model.positions.times(positions) };
-        let mut out = self.adjoint(|m| {
-            let mut u = self.corner_values(m, &nodes);
-            if let Some(gradient) = self.gradients.get(m) {
-                let corners = self.model.tet_points(self.moments[m].tet as usize);
-                u.iter_mut().zip(corners).for_each(|(u, p)| *u -= *gradient * points[p]);
-            }
-            self.moments[m].product(u)
-        });
+        let points = if self.motion.is_none() { Vec::new() } else { self.model.positions.times(positions) };
+        let mut out = self.adjoint(
+            |m| {
+                let mut u = self.corner_values(m, &nodes);
+                let tet = self.evidence.moments[m].tet as usize;
+                if let Some(motion) = &self.motion {
+                    let corners = self.model.tet_points(tet);
+                    u.iter_mut().zip(corners).for_each(|(u, p)| *u -= motion.gradients[tet] * points[p]);
+                }
+                self.evidence.moments[m].product(u)
+            },
+            |row| {
+                let mut change = self.evidence.edges.mean(row, self.model, &nodes);
+                if let Some(motion) = &self.motion {
+                    motion.terms(row, self, |point, matrix| change += matrix * points[point]);
+                }
+                change
+            },
+        );
         out.iter_mut().zip(x).zip(&self.damping).for_each(|((out, x), d)| *out += *x * *d);
         out
     }

@@ -8,10 +8,10 @@
 use glam::Vec3;
 
 use super::FitParams;
-use super::color::{Colors, squared_error};
+use super::color::Colors;
+use super::evidence::Evidence;
 use super::guard::Guard;
 use super::model::Model;
-use super::moments::{Moments, measure};
 use super::normal::{NormalEquations, PositionDamping};
 use super::patch::Patch;
 use super::sparse::conjugate_gradient;
@@ -39,7 +39,7 @@ pub(super) fn optimize_positions(
     colors: &mut Colors,
     frames: &Volume,
     params: &FitParams,
-) -> (Vec<Moments>, Refined) {
+) -> (Evidence, Refined) {
     let guard = Guard::new(&patch.mesh, params.minimum_altitude);
     let mut state = State::start(patch, model, colors.clone(), frames, params);
     let mut damping = DAMPING_START;
@@ -48,10 +48,10 @@ pub(super) fn optimize_positions(
         let wish = state.step(patch, model, params, damping);
         let before = patch.mesh.positions.clone();
         report.refused += guard.move_all(&mut patch.mesh, &wish.steps);
-        let mut tried = State { colors: state.colors.clone(), moments: Vec::new(), error: 0.0 };
+        let mut tried = State { colors: state.colors.clone(), evidence: Evidence::default(), error: 0.0 };
         tried.colors.add(&wish.colors);
         // The moments are most of a fit's memory: one set at a time. Steps that fail are few.
-        state.moments = Vec::new();
+        state.evidence = Evidence::default();
         tried.look(patch, model, frames, params);
         if tried.error < state.error {
             let gain = (state.error - tried.error) / state.error;
@@ -71,13 +71,13 @@ pub(super) fn optimize_positions(
         }
     }
     *colors = state.colors;
-    (state.moments, report)
+    (state.evidence, report)
 }
 
 /// A point of the search: colours, what the frames say at the patch's positions, and the error.
 struct State {
     colors: Colors,
-    moments: Vec<Moments>,
+    evidence: Evidence,
     error: f64,
 }
 
@@ -91,7 +91,7 @@ struct Wish {
 
 impl State {
     fn start(patch: &Patch, model: &Model, colors: Colors, frames: &Volume, params: &FitParams) -> Self {
-        let mut state = Self { colors, moments: Vec::new(), error: 0.0 };
+        let mut state = Self { colors, evidence: Evidence::default(), error: 0.0 };
         state.look(patch, model, frames, params);
         state
     }
@@ -99,29 +99,26 @@ impl State {
     /// Measures at the patch's positions and lets the colours follow.
     fn look(&mut self, patch: &Patch, model: &Model, frames: &Volume, params: &FitParams) {
         self.measure(patch, model, frames);
-        self.colors.optimize(model, &self.moments, params.color_steps_between, params);
-        self.error = squared_error(model, &self.moments, &self.colors.now);
+        self.colors.optimize(model, &self.evidence, params.color_steps_between, params);
+        self.error = self.evidence.squared_error(model, &self.colors.now);
     }
 
     fn measure(&mut self, patch: &Patch, model: &Model, frames: &Volume) {
         let points = model.points(&patch.mesh.positions);
-        self.moments = measure(model, &points, &model.node_colors(&self.colors.now), frames);
+        self.evidence = Evidence::gather(model, &points, &model.node_colors(&self.colors.now), frames);
     }
 
     fn step(&self, patch: &Patch, model: &Model, params: &FitParams, damping: f32) -> Wish {
         let mesh = &patch.mesh;
         let points = model.points(&mesh.positions);
         let nodes = model.node_colors(&self.colors.now);
-        // Vertices on label surfaces stay where the surface fit put them: pixels are sampled at their centres here, and
-        // a surface that follows blended edge pixels so becomes a saw (docs/benchmarks.md).
-        let movable = |v: usize| if patch.boundary[v] { Vec3::ZERO } else { patch.movable_components(v) };
-        let movable = (0..mesh.positions.len()).map(movable);
+        let movable = (0..mesh.positions.len()).map(|v| patch.movable_components(v));
         let mask = self.colors.mask.iter().copied().chain(movable).collect();
         let damping =
             PositionDamping { relative: vec![damping; mesh.positions.len()], absolute: params.position_stiffness };
         let anchors = vec![params.color_anchor; self.colors.now.len()];
         let system = NormalEquations::of_colors_and_positions(
-            (model, &self.moments),
+            (model, &self.evidence),
             (&points, &nodes),
             mask,
             anchors,

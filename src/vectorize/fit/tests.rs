@@ -362,3 +362,71 @@ fn requests_that_do_not_fit_are_refused() {
     odd.push(Arc::new(Frame::from_fn(4, 4, |_, _| [0; 3]).expect("a valid size")));
     assert_eq!(refused(&free, &odd, &params), Err("frame size"));
 }
+
+/// A dark disc that moves over a bright ramp, with blended pixels at its border.
+fn disc(p: Vec3) -> Vec3 {
+    let ground = Vec3::new(180.0 + p.x, 200.0, 90.0 + 2.0 * p.y);
+    let mut covered = 0.0;
+    for n in 0..64 {
+        let sub = Vec3::new((n % 8) as f32 - 3.5, (n / 8) as f32 - 3.5, 0.0) / 8.0;
+        let centre = Vec3::new(16.0 + 1.1 * p.t(), 15.0 + 0.3 * p.t(), p.t());
+        covered += f32::from((p + sub - centre).length() < 9.0) / 64.0;
+    }
+    ground.lerp(Vec3::new(20.0, 40.0, 30.0), covered)
+}
+
+fn in_disc(p: Vec3) -> u32 {
+    u32::from((p - Vec3::new(16.0 + 1.1 * p.t(), 15.0 + 0.3 * p.t(), p.t())).length() < 9.0)
+}
+
+#[test]
+fn the_error_answers_to_moves_as_the_equations_say() {
+    let mesh = lattice([10, 8, 4], 0.2, in_disc);
+    let frames = film(disc);
+    for levels in [0, 1] {
+        let params = FitParams { color_iterations: 60, ..at_level(levels) };
+        let free = vec![true; mesh.positions.len()];
+        let patch = Patch::around(&mesh, &free, RINGS);
+        let model = Model::new(&patch.mesh, &patch.free, levels);
+        let mut colors = Colors::new(patch.mesh.wedges.iter().map(|w| w.color).collect(), &patch.free_wedges());
+        let gather = |mesh: &TetMesh, colors: &Colors| {
+            let points = model.points(&mesh.positions);
+            Evidence::gather(&model, &points, &model.node_colors(&colors.now), &frames)
+        };
+        let evidence = gather(&patch.mesh, &colors);
+        colors.optimize(&model, &evidence, params.color_iterations, &params);
+        let (mut dot, mut norms) = (0.0, [0.0, 0.0]);
+        let points = model.points(&patch.mesh.positions);
+        let nodes = model.node_colors(&colors.now);
+        let mask = vec![Vec3::ONE; colors.now.len() + patch.mesh.positions.len()];
+        let damping = normal::PositionDamping { relative: vec![0.0; patch.mesh.positions.len()], absolute: 0.0 };
+        let anchors = vec![0.0; colors.now.len()];
+        let system = normal::NormalEquations::of_colors_and_positions(
+            (&model, &evidence),
+            (&points, &nodes),
+            mask,
+            anchors,
+            &damping,
+        );
+        let descent = system.right_hand_side(&nodes, |_| Vec3::ZERO).split_off(colors.now.len());
+        for vertex in (0..patch.mesh.positions.len()).filter(|&v| patch.boundary[v]) {
+            for axis in (0..3).filter(|&axis| patch.movable_components(vertex)[axis] != 0.0) {
+                let error = |step: i32| {
+                    let mut moved = patch.mesh.clone();
+                    moved.positions[vertex][axis] += step;
+                    gather(&moved, &colors).squared_error(&model, &colors.now)
+                };
+                // One lattice unit either way: a quarter of a pixel.
+                let found = (error(-1) - error(1)) / 0.25;
+                let told = 2.0 * f64::from(descent[vertex][axis]);
+                dot += found * told;
+                norms[0] += found * found;
+                norms[1] += told * told;
+            }
+        }
+        let cosine = dot / (norms[0] * norms[1]).sqrt();
+        assert!(cosine > 0.9, "level {levels}: {cosine}");
+        let ratio = (norms[1] / norms[0]).sqrt();
+        assert!((0.8..1.25).contains(&ratio), "level {levels}: {ratio}");
+    }
+}

@@ -13,6 +13,7 @@
 mod border;
 mod carry;
 mod connect;
+mod content;
 mod contours;
 mod cut;
 mod identity;
@@ -35,6 +36,7 @@ mod tests;
 
 use border::{BorderRules, settle};
 use carry::{carry, estimate_motion};
+use content::Content;
 use cut::SceneView;
 use identity::name_regions;
 use islands::dissolve_islands;
@@ -74,7 +76,7 @@ pub struct SegmentParams {
 impl SegmentParams {
     /// Defaults for this number of superpixels.
     pub fn new(superpixels: u32) -> Self {
-        Self { superpixels, jump_levels: 40.0, hysteresis_levels: 25.0, worth_levels: 800.0, min_area_px: 12 }
+        Self { superpixels, jump_levels: 60.0, hysteresis_levels: 25.0, worth_levels: 800.0, min_area_px: 12 }
     }
 }
 
@@ -111,6 +113,8 @@ pub struct Segmenter {
     view: Option<SceneView>,
     /// The slab so far; none before its first frame.
     slab: Option<Slab>,
+    /// The same where labels are chosen by content.
+    content: Option<Content>,
 }
 
 /// Sizes and numbers of superpixels.
@@ -144,6 +148,7 @@ impl Segmenter {
             simple: SimplePoints::new(),
             view: None,
             slab: None,
+            content: None,
         }
     }
 
@@ -155,6 +160,7 @@ impl Segmenter {
     /// Forgets the labels: the next frame starts afresh, from label 0.
     pub fn start_slab(&mut self) {
         self.slab = None;
+        self.content = None;
     }
 
     /// The labels of the next frame, a new slab started where it shows another scene.
@@ -178,6 +184,10 @@ impl Segmenter {
         self.view = Some(SceneView::new(frame));
         if self.params.superpixels == 1 {
             return LabelPlane::uniform(frame.width(), frame.height(), Label(0));
+        }
+        if self.params.superpixels == 0 {
+            let (raster, params) = (self.raster, self.params);
+            return self.content.get_or_insert_with(|| Content::new(raster, params)).push(frame);
         }
         let slab = match self.slab.take() {
             None => self.first(frame),

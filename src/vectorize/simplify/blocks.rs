@@ -10,8 +10,9 @@ use glam::IVec3;
 
 use super::SimplifyParams;
 use super::collapse::{Goal, SimplifyReport, Unfrozen, simplify};
-use super::quadric::WedgeQuadric;
+use super::quadric::{PositionQuadric, WedgeQuadric};
 use super::stars::Stars;
+use super::surfaces::surface_quadrics;
 use super::work_mesh::{NONE, WorkMesh};
 use crate::mesh::{Domain, Sides, TetMesh, Wedge};
 use crate::vectorize::parallel::map;
@@ -28,10 +29,13 @@ pub struct BlockGoal {
     pub max_error: f32,
 }
 
-/// A block's part of a run, and which of its vertices are to stay.
+/// A block's part of a run.
 struct Block {
     mesh: TetMesh,
+    /// Which of its vertices are to stay.
     frozen: Vec<bool>,
+    /// What its vertices' label surfaces cost, but for frozen ones.
+    surfaces: Vec<Option<PositionQuadric>>,
 }
 
 impl BlockGoal {
@@ -46,8 +50,9 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     pub fn append_simplified(&mut self, run: &TetMesh, goal: BlockGoal, params: &SimplifyParams) -> SimplifyReport {
         let goal = goal.of_one(params.blocks(run.positions.len()));
         let (tets, owners) = split(run, params);
+        let surfaces = surface_quadrics(run, params.surface_weight);
         let blocks = map(tets, |tets| {
-            let block = cut(run, &tets, &owners);
+            let block = cut(run, &tets, &owners, &surfaces);
             let mut mesh = Self::new(self.domain);
             mesh.fill(&block, params);
             let report = mesh.simplify_alone(goal, params);
@@ -56,12 +61,17 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         let bottom = run.positions.iter().map(|p| p.z).min().unwrap_or(0);
         let mut glued = self.plane(bottom);
         glued.values().for_each(|&vertex| self.vertices[vertex as usize].frozen = true);
-        let (first_vertex, first_tet) = (self.vertices.len(), self.tets.len());
+        let first_vertex = self.vertices.len();
         let total = self.absorb_all(blocks, &mut glued, params.spread_weight);
         let total = SimplifyReport { vertices_in_window: self.vertices.len() - first_vertex, ..total };
         self.stars = Stars::new(self.vertices.len(), &self.tets);
-        // The blocks have seen all faces but those between frozen vertices.
-        self.add_surfaces(first_tet, |frozen| frozen == [true; 3], params.surface_weight);
+        for ((position, quadric), _) in
+            run.positions.iter().zip(&surfaces).zip(&owners).filter(|&(_, &owner)| owner == SHARED)
+        {
+            if let (Some(quadric), Some(&vertex)) = (quadric, glued.get(position)) {
+                self.surface_mut(vertex).add_scaled(quadric, 1.0);
+            }
+        }
         self.vertices.iter_mut().for_each(|vertex| vertex.frozen = false);
         total
     }
@@ -186,7 +196,11 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         self.add_tets(&block.mesh, &vertices);
         self.spread(0, params.spread_weight);
         self.stars = Stars::new(self.vertices.len(), &self.tets);
-        self.add_surfaces(0, |frozen| frozen != [true; 3], params.surface_weight);
+        for (vertex, quadric) in vertices.into_iter().zip(&block.surfaces) {
+            if let Some(quadric) = quadric {
+                self.surface_mut(vertex).add_scaled(quadric, 1.0);
+            }
+        }
     }
 
     /// Takes over blocks, in the same memory as far as possible.
@@ -291,17 +305,20 @@ fn owners(vertices: usize, tets: impl Iterator<Item = ([u32; 4], u32)>) -> Vec<u
 }
 
 /// The mesh of some of a run's tets.
-fn cut(run: &TetMesh, tets: &[u32], owners: &[u32]) -> Block {
+fn cut(run: &TetMesh, tets: &[u32], owners: &[u32], surfaces: &[Option<PositionQuadric>]) -> Block {
     let mut vertices = HashMap::new();
     let mut wedges = HashMap::new();
     let mut mesh = TetMesh::empty(run.domain);
     let mut frozen = Vec::new();
+    let mut own_surfaces = Vec::new();
     for &tet in tets {
         let corners = run.tets[tet as usize].map(|wedge| {
             *wedges.entry(wedge).or_insert_with(|| {
                 let whole = run.wedges[wedge.index()];
                 let vertex = *vertices.entry(whole.vertex).or_insert_with(|| {
-                    frozen.push(owners[whole.vertex.index()] == SHARED);
+                    let is_shared = owners[whole.vertex.index()] == SHARED;
+                    frozen.push(is_shared);
+                    own_surfaces.push(surfaces[whole.vertex.index()].filter(|_| !is_shared));
                     mesh.push_vertex(run.positions[whole.vertex.index()])
                 });
                 mesh.push_wedge(Wedge { vertex, ..whole })
@@ -309,5 +326,5 @@ fn cut(run: &TetMesh, tets: &[u32], owners: &[u32]) -> Block {
         });
         mesh.tets.push(corners);
     }
-    Block { mesh, frozen }
+    Block { mesh, frozen, surfaces: own_surfaces }
 }

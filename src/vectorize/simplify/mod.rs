@@ -11,6 +11,7 @@ mod legality;
 mod quadric;
 mod queue;
 mod stars;
+mod surfaces;
 mod work_mesh;
 
 pub use blocks::BlockGoal;
@@ -25,7 +26,8 @@ pub struct SimplifyParams {
     /// Eta of Eq. 5 and 6: weight of the squared distance (pixels) to the lattice vertices inherited, against squared
     /// colour levels. Flat between 0.03 and 3 (docs/benchmarks.md).
     pub spread_weight: f32,
-    /// Weight of the squared distance (pixels) to the label surfaces inherited, per square pixel of surface.
+    /// Weight of the squared distance (pixels) to the label surfaces inherited, per square pixel of surface and squared
+    /// level of the jump there: 1 is what the moved jump costs.
     pub surface_weight: f32,
     /// Least six-fold volume of a tet, in cubic pixels; a tet of the unit lattice has 1.
     pub min_volume6: f32,
@@ -51,7 +53,7 @@ impl Default for SimplifyParams {
     fn default() -> Self {
         Self {
             spread_weight: 0.3,
-            surface_weight: 30.0,
+            surface_weight: 0.3,
             min_volume6: 1.0 / 16.0,
             min_shape: 0.03,
             max_extent_frames: 10,

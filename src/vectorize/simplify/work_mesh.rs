@@ -10,7 +10,8 @@ use glam::{IVec3, Vec3};
 use super::SimplifyParams;
 use super::quadric::{PositionQuadric, TetField, WedgeQuadric};
 use super::stars::Stars;
-use crate::mesh::{Domain, FACES, Sides, TetMesh};
+use super::surfaces::surface_quadrics;
+use crate::mesh::{Domain, Sides, TetMesh};
 use crate::video::Label;
 
 /// No number.
@@ -105,7 +106,11 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         self.add_tets(run, &vertices);
         self.spread(first_vertex, params.spread_weight);
         self.stars = Stars::new(self.vertices.len(), &self.tets);
-        self.add_surfaces(self.tets.len() - run.tets.len(), |_| true, params.surface_weight);
+        for (vertex, quadric) in vertices.iter().zip(surface_quadrics(run, params.surface_weight)) {
+            if let Some(quadric) = quadric {
+                self.surface_mut(*vertex).add_scaled(&quadric, 1.0);
+            }
+        }
     }
 
     /// The vertices at time `t` (lattice units), by position.
@@ -199,51 +204,6 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
                 let vertex = vertices[run.vertex(*wedge).index()];
                 self.wedge_mut(vertex, run.tet_label(tet)).quadric.add(&Q::of_tet(&field));
             }
-        }
-    }
-
-    /// Adds the planes of the faces between labels that `is_wanted`, found among tets from `first_tet` on, to their
-    /// vertices. `weight`: squared levels a squared pixel of distance, a square pixel of surface.
-    pub(super) fn add_surfaces(&mut self, first_tet: usize, is_wanted: impl Fn([bool; 3]) -> bool, weight: f32) {
-        let is_inside = |mesh: &Self, v: u32| mesh.vertices[v as usize].first.next == NONE;
-        for tet in first_tet..self.tets.len() {
-            let corners = self.tets[tet];
-            if corners.iter().all(|&v| is_inside(self, v)) {
-                continue;
-            }
-            for face in FACES {
-                let face = face.map(|corner| corners[corner]);
-                let frozen = face.map(|v| self.vertices[v as usize].frozen);
-                if face.iter().any(|&v| is_inside(self, v)) || !is_wanted(frozen) {
-                    continue;
-                }
-                // Each face between labels once: from its side of the greater label, which may be an older tet.
-                let across = self.across(tet, face);
-                let between = across.is_some_and(|other| {
-                    self.labels[other] != self.labels[tet]
-                        && (other < first_tet || self.labels[other] < self.labels[tet])
-                });
-                if between {
-                    self.add_plane(face, weight);
-                }
-            }
-        }
-    }
-
-    /// The tet on the other side of a face of `tet`.
-    fn across(&self, tet: usize, face: [u32; 3]) -> Option<usize> {
-        let star = self.stars.star(face[0]).iter().map(|&t| t as usize);
-        star.filter(|&t| t != tet).find(|&t| face.iter().all(|v| self.tets[t].contains(v)))
-    }
-
-    fn add_plane(&mut self, face: [u32; 3], weight: f32) {
-        let [a, b, c] = face.map(|v| self.vertices[v as usize].position);
-        let normal = self.offset(a, b).cross(self.offset(a, c));
-        let length = normal.length();
-        // A third of the face's area for each corner.
-        let quadric = PositionQuadric::plane(normal / length, 0.0, weight * length / 6.0);
-        for v in face {
-            self.surface_mut(v).add_scaled(&quadric, 1.0);
         }
     }
 

@@ -1,0 +1,47 @@
+//! All that the frames say about a model: tet by tet where colour is continuous, pixel by pixel along label boundaries.
+
+use glam::{IVec3, Vec3};
+
+use super::edges::EdgePixels;
+use super::interface::find_crossings;
+use super::marks::Marks;
+use super::model::Model;
+use super::moments::{Moments, View, measure};
+use super::parallel;
+use super::planes::Planes;
+use crate::video::Volume;
+
+/// What the frames say at the model's present positions.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Evidence {
+    /// Of tets, over the pixels whose centres they hold and that no boundary passes.
+    pub(super) moments: Vec<Moments>,
+    /// Pixels that boundaries pass.
+    pub(super) edges: EdgePixels,
+}
+
+impl Evidence {
+    /// Looks at the frames. `points` are the model's points, `colors` its nodes' colours (only to choose references by).
+    pub(super) fn gather(model: &Model, points: &[IVec3], colors: &[Vec3], frames: &Volume) -> Self {
+        let planes = Planes::new(model, frames);
+        let crossings = find_crossings(&model.interfaces, points, &planes);
+        let marks = Marks::new(&crossings, model.domain.width, model.domain.height);
+        let (moments, pieces) = measure(model, points, colors, &View { planes, marks: &marks });
+        Self { moments, edges: EdgePixels::new(&marks, frames, pieces, &crossings) }
+    }
+
+    /// Number of pixels that count.
+    pub(super) fn pixels(&self) -> u64 {
+        self.moments.iter().map(|m| u64::from(m.pixels)).sum::<u64>() + self.edges.counted()
+    }
+
+    /// The squared error over all pixels and channels, for wedges of these colours.
+    pub(super) fn squared_error(&self, model: &Model, wedge_colors: &[Vec3]) -> f64 {
+        let nodes = model.node_colors(wedge_colors);
+        let inside = parallel::sum(self.moments.len(), |m| {
+            let tet = model.tets[self.moments[m].tet as usize];
+            self.moments[m].energy(tet.map(|n| nodes[n as usize]))
+        });
+        inside + self.edges.energy(model, &nodes)
+    }
+}

@@ -1,0 +1,81 @@
+//! Labels by content: a discontinuity only where the picture jumps.
+//!
+//! In: frames of a slab, in order. Out: a label for every pixel. `zones` are
+//! what has one colour or changes it slowly; `unmix` takes every other pixel for a blend of what lies around it, or
+//! for a stroke too thin to have a pixel of its own; `merge` gives up boundaries that are weak, and `naming` gives
+//! labels to regions such that they last.
+
+mod merge;
+mod naming;
+mod unmix;
+mod zones;
+
+use merge::{MergeRules, merge};
+use naming::{Before, Palette};
+use unmix::unmix;
+use zones::find_zones;
+
+use super::SegmentParams;
+use super::motion::MotionField;
+use super::pyramid::{Gray, pyramid};
+use super::raster::Raster;
+use crate::video::{Frame, Label, LabelPlane};
+
+/// A region's number within a frame.
+pub(super) type Region = u32;
+
+/// What a pixel is taken for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Pixel {
+    /// The region that it belongs to.
+    pub(super) region: Region,
+    /// Its region's colour there, in 8-bit levels.
+    pub(super) color: glam::Vec3,
+}
+
+/// Where colours vary inside zones, by noise or texture, a jump must be this many times more to be seen.
+const NOISE_JUMP: f32 = 12.0;
+/// Jumps below this are not worth a boundary in the cleanest picture.
+const LEAST_JUMP: f32 = 16.0;
+
+/// A slab's labels by content, frame by frame.
+#[derive(Debug, Clone)]
+pub(super) struct Content {
+    raster: Raster,
+    params: SegmentParams,
+    before: Option<(Frame, Vec<Gray>, LabelPlane)>,
+    palette: Palette,
+}
+
+impl Content {
+    /// Starts a slab.
+    pub(super) fn new(raster: Raster, params: SegmentParams) -> Self {
+        Self { raster, params, before: None, palette: Palette::default() }
+    }
+
+    /// The labels of the next frame.
+    pub(super) fn push(&mut self, frame: &Frame) -> LabelPlane {
+        if let Some((before, _, labels)) = &self.before
+            && before == frame
+        {
+            return labels.clone();
+        }
+        let zones = find_zones(self.raster, frame);
+        let mut pixels = unmix(self.raster, frame, &zones);
+        let noise = zones.roughness(self.raster, frame);
+        let jump = (NOISE_JUMP * noise).clamp(LEAST_JUMP, self.params.jump_levels);
+        let rules = MergeRules { jump, min_area: self.params.min_area_px };
+        let regions = merge(self.raster, &mut pixels, rules);
+        let levels = pyramid(frame);
+        let before = self.before.as_ref().map(|(before, before_levels, labels)| Before {
+            frame: before,
+            labels,
+            motion: MotionField::estimate(&levels, before_levels),
+        });
+        let names = self.palette.name(self.raster, frame, &pixels, &regions, before);
+        let labels = pixels.iter().map(|pixel| Label(names[pixel.region as usize])).collect();
+        let plane = LabelPlane::new(frame.width(), frame.height(), labels);
+        self.before = Some((frame.clone(), levels, plane.clone()));
+        plane
+    }
+}

@@ -1,0 +1,108 @@
+//! Labels for regions, such that what was there in the frame before keeps its label.
+//!
+//! In: a frame's regions, and the frame before with its labels. Out: a label for each region. A region takes the label
+//! that most of its pixels had where they come from, if no other region has more of it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::Vec3;
+
+use super::super::motion::{BLOCK, MotionField};
+use super::super::raster::Raster;
+use super::Pixel;
+use super::merge::Regions;
+use crate::video::{Frame, LabelPlane};
+
+/// Most that a channel may differ from where a pixel comes from, in levels, to vote.
+const ALIKE: i32 = 30;
+
+/// The frame before.
+pub(super) struct Before<'a> {
+    pub(super) frame: &'a Frame,
+    pub(super) labels: &'a LabelPlane,
+    /// From the frame now to the one before.
+    pub(super) motion: MotionField,
+}
+
+/// Labels that a slab has used, and what they looked like lately.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Palette {
+    colors: Vec<Vec3>,
+}
+
+impl Palette {
+    /// A label for each region of a frame.
+    pub(super) fn name(
+        &mut self,
+        raster: Raster,
+        frame: &Frame,
+        pixels: &[Pixel],
+        regions: &Regions,
+        before: Option<Before<'_>>,
+    ) -> Vec<u32> {
+        let votes = before.map_or_else(BTreeMap::new, |before| before.votes(raster, frame, pixels));
+        let mut order: Vec<u32> = (0..regions.areas.len() as u32).collect();
+        order.sort_by_key(|&region| std::cmp::Reverse(regions.areas[region as usize]));
+        let mut names = vec![NONE; order.len()];
+        for region in order {
+            let taken: BTreeSet<u32> = regions.beside(region).map(|other| names[other as usize]).collect();
+            let color = regions.colors[region as usize];
+            let mut voted: Vec<(u32, u32)> =
+                votes.range((region, 0)..=(region, NONE)).map(|(&(_, label), &n)| (n, label)).collect();
+            voted.sort_unstable_by_key(|&(n, label)| (std::cmp::Reverse(n), label));
+            let least = regions.areas[region as usize] / LEAST_SHARE;
+            let kept = voted.iter().filter(|(n, _)| *n >= least).map(|&(_, label)| label).find(|l| !taken.contains(l));
+            let name = kept.or_else(|| self.nearest(color, &taken)).unwrap_or_else(|| {
+                self.colors.push(color);
+                self.colors.len() as u32 - 1
+            });
+            self.colors[name as usize] = self.colors[name as usize].lerp(color, DRIFT);
+            names[region as usize] = name;
+        }
+        names
+    }
+
+    /// The label that looks most like a colour, if one looks alike; parts of a picture that are not beside each other can
+    /// share one.
+    fn nearest(&self, color: Vec3, taken: &BTreeSet<u32>) -> Option<u32> {
+        let free = (0..).zip(&self.colors).filter(|(label, _)| !taken.contains(label));
+        let near = free.map(|(label, own)| (own.distance_squared(color), label));
+        let best = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        (best.0 < SAME_COLOR).then_some(best.1)
+    }
+}
+
+/// No label.
+const NONE: u32 = u32::MAX;
+/// A label that at least one in so many of a region's pixels had before can go on.
+const LEAST_SHARE: u32 = 4;
+/// Squared distance of colours that can share a label: 24 levels a channel.
+const SAME_COLOR: f32 = 3.0 * 24.0 * 24.0;
+/// How fast a label's colour follows its regions'.
+const DRIFT: f32 = 0.3;
+
+impl Before<'_> {
+    /// How many of each region's pixels had each label.
+    fn votes(&self, raster: Raster, frame: &Frame, pixels: &[Pixel]) -> BTreeMap<(u32, u32), u32> {
+        let mut votes: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+        for (p, pixel) in pixels.iter().enumerate() {
+            if let Some(label) = self.label(raster, frame, p) {
+                *votes.entry((pixel.region, label)).or_default() += 1;
+            }
+        }
+        votes
+    }
+
+    /// The label where a pixel comes from, if it looks alike there.
+    fn label(&self, raster: Raster, frame: &Frame, p: usize) -> Option<u32> {
+        let (x, y) = raster.xy(p);
+        let [dx, dy] = self.motion.clamped((x / BLOCK) as isize, (y / BLOCK) as isize);
+        let (qx, qy) = (x as i32 + dx, y as i32 + dy);
+        if !(0..raster.width as i32).contains(&qx) || !(0..raster.height as i32).contains(&qy) {
+            return None;
+        }
+        let (here, there) = (frame.row(y as u32)[x], self.frame.row(qy as u32)[qx as usize]);
+        let is_alike = (0..3).all(|c| (i32::from(here[c]) - i32::from(there[c])).abs() <= ALIKE);
+        is_alike.then(|| self.labels.label(qx as u32, qy as u32).0)
+    }
+}

@@ -1,0 +1,131 @@
+//! Zones: connected pixels of one colour, or one that changes slowly.
+//!
+//! In: a frame. Out: for every pixel the zone that it is purely of, if it is of one.
+
+use super::super::raster::Raster;
+use crate::video::Frame;
+
+/// No zone.
+pub(super) const IMPURE: u32 = u32::MAX;
+
+/// Most that a channel may differ within two by two pixels of one zone, in levels: in the cleanest picture, where faint
+/// edges are seen, and in any, since an edge of 60 levels blurred over three pixels must be steeper.
+const RANGE: std::ops::RangeInclusive<usize> = 6..=18;
+/// Which part of a picture's blocks decide what is clean, and how many times as much as within them is allowed.
+const CLEAN_PART: f32 = 0.5;
+const CLEAN_TIMES: usize = 3;
+/// Fewest pixels of a zone.
+const LEAST_PIXELS: u32 = 6;
+
+/// The zones of a frame.
+#[derive(Debug, Clone)]
+pub(super) struct Zones {
+    /// Zone of each pixel, or [`IMPURE`].
+    pub(super) of_pixel: Vec<u32>,
+    /// Number of zones.
+    pub(super) count: u32,
+}
+
+/// Finds the zones: pixels of uniform two by two blocks, joined where blocks overlap.
+pub(super) fn find_zones(raster: Raster, frame: &Frame) -> Zones {
+    let Raster { width, height } = raster;
+    let mut forest: Vec<u32> = (0..raster.len() as u32).collect();
+    let mut pure = vec![false; raster.len()];
+    let allowed = allowed_range(raster, frame);
+    for y in 0..height.saturating_sub(1) {
+        let (upper, lower) = (frame.row(y as u32), frame.row(y as u32 + 1));
+        for x in 0..width.saturating_sub(1) {
+            if range_of([upper[x], upper[x + 1], lower[x], lower[x + 1]]) <= allowed {
+                let p = y * width + x;
+                for q in [p, p + 1, p + width, p + width + 1] {
+                    pure[q] = true;
+                    join(&mut forest, p as u32, q as u32);
+                }
+            }
+        }
+    }
+    number(&mut forest, &pure)
+}
+
+impl Zones {
+    /// How much neighbouring pixels of the same zone differ: root mean square over the channels, in levels.
+    pub(super) fn roughness(&self, raster: Raster, frame: &Frame) -> f32 {
+        let (mut sum, mut count) = (0u64, 0u64);
+        let pixels = frame.pixels();
+        for (p, q) in raster.side_pairs() {
+            if self.of_pixel[p] != IMPURE && self.of_pixel[p] == self.of_pixel[q] {
+                let difference = |c: usize| u64::from(pixels[p][c].abs_diff(pixels[q][c]));
+                sum += (0..3).map(|c| difference(c).pow(2)).sum::<u64>();
+                count += 3;
+            }
+        }
+        (sum as f32 / count.max(1) as f32).sqrt()
+    }
+}
+
+/// Most that a channel may differ within a block of this frame.
+fn allowed_range(raster: Raster, frame: &Frame) -> u8 {
+    let mut histogram = [0usize; 256];
+    for y in (0..raster.height.saturating_sub(1)).step_by(2) {
+        let (upper, lower) = (frame.row(y as u32), frame.row(y as u32 + 1));
+        for x in (0..raster.width.saturating_sub(1)).step_by(2) {
+            histogram[usize::from(range_of([upper[x], upper[x + 1], lower[x], lower[x + 1]]))] += 1;
+        }
+    }
+    let wanted = (CLEAN_PART * histogram.iter().sum::<usize>() as f32) as usize;
+    let mut below = 0;
+    let clean = histogram.iter().position(|&blocks| {
+        below += blocks;
+        below > wanted
+    });
+    (CLEAN_TIMES * clean.unwrap_or(0)).clamp(*RANGE.start(), *RANGE.end()) as u8
+}
+
+/// Most that a channel differs among some pixels.
+fn range_of(pixels: [[u8; 3]; 4]) -> u8 {
+    let range = |channel: usize| {
+        let values = pixels.map(|pixel| pixel[channel]);
+        let (low, high) = values.iter().fold((u8::MAX, 0), |(low, high), &v| (low.min(v), high.max(v)));
+        high - low
+    };
+    range(0).max(range(1)).max(range(2))
+}
+
+fn number(forest: &mut [u32], pure: &[bool]) -> Zones {
+    let mut area = vec![0u32; forest.len()];
+    for p in 0..forest.len() {
+        if pure[p] {
+            area[root(forest, p as u32) as usize] += 1;
+        }
+    }
+    let mut names = vec![IMPURE; forest.len()];
+    let mut count = 0;
+    let mut of_pixel = vec![IMPURE; forest.len()];
+    for p in 0..forest.len() {
+        let root = root(forest, p as u32) as usize;
+        if pure[p] && area[root] >= LEAST_PIXELS {
+            if names[root] == IMPURE {
+                names[root] = count;
+                count += 1;
+            }
+            of_pixel[p] = names[root];
+        }
+    }
+    Zones { of_pixel, count }
+}
+
+/// The root of an item's tree, whose paths are halved on the way.
+pub(super) fn root(forest: &mut [u32], mut item: u32) -> u32 {
+    while forest[item as usize] != item {
+        forest[item as usize] = forest[forest[item as usize] as usize];
+        item = forest[item as usize];
+    }
+    item
+}
+
+/// Joins two trees under the lower root.
+pub(super) fn join(forest: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (root(forest, a), root(forest, b));
+    let (low, high) = (a.min(b), a.max(b));
+    forest[high as usize] = low;
+}
