@@ -3,12 +3,12 @@
 //! In: frames, in order. Out: a [`LabelPlane`] for each, and whether a frame starts a new scene. Forbidden here: the
 //! mesh; any look at later frames; anything that depends on the order of a hash map or on threads.
 //!
-//! A frame passes through: `carry` (superpixels of the frame before follow their motion) or, at a slab's start,
-//! `seed`; `border` (border pixels move to where the picture has its edges); `population` (births, splits,
-//! deaths). These are temporal superpixels in the sense of §III-A and of Chang, Wei and Fisher, "A video representation
-//! using temporal superpixels" (CVPR 2013). Where the labels are chosen by content, superpixels are then merged across
-//! weak boundaries (`regions`), named after the frame before (`identity`), and their boundaries smoothed
-//! (`polish`, `islands`): a discontinuity costs vertices, so there is one only where it pays.
+//! Where a number of labels is asked for, they are temporal superpixels as in §III-A (`temporal`, a room of its own).
+//! Where labels are chosen by content, a frame passes through: `carry` (superpixels of the frame before follow their
+//! motion) or, at a slab's start, `seed`; `border` (border pixels move to where the picture has its edges);
+//! `population` (births, splits, deaths). These superpixels are then merged across weak boundaries (`regions`), named
+//! after the frame before (`identity`), and their boundaries smoothed (`polish`, `islands`): a discontinuity costs
+//! vertices, so there is one only where it pays.
 
 mod border;
 mod carry;
@@ -30,6 +30,7 @@ mod seed;
 mod slivers;
 mod stillness;
 mod superpixels;
+mod temporal;
 #[cfg(test)]
 mod tests;
 
@@ -49,6 +50,7 @@ use regions::{MergeRules, merge};
 use slivers::dissolve_slivers;
 use stillness::Stillness;
 use superpixels::{Spread, Superpixels};
+use temporal::TemporalSuperpixels;
 
 use crate::video::{Frame, Label, LabelPlane};
 
@@ -107,6 +109,8 @@ pub struct Segmenter {
     budget: Budget,
     tables: LabTables,
     simple: SimplePoints,
+    /// Where a number of superpixels is asked for.
+    temporal: TemporalSuperpixels,
     /// The last frame pushed, of whatever slab.
     view: Option<SceneView>,
     /// The slab so far; none before its first frame.
@@ -142,6 +146,7 @@ impl Segmenter {
             budget: Budget::new(raster, params),
             tables: LabTables::new(),
             simple: SimplePoints::new(),
+            temporal: TemporalSuperpixels::new(raster, params.superpixels, params.min_area_px),
             view: None,
             slab: None,
         }
@@ -155,6 +160,7 @@ impl Segmenter {
     /// Forgets the labels: the next frame starts afresh, from label 0.
     pub fn start_slab(&mut self) {
         self.slab = None;
+        self.temporal.start_slab();
     }
 
     /// The labels of the next frame, a new slab started where it shows another scene.
@@ -178,6 +184,9 @@ impl Segmenter {
         self.view = Some(SceneView::new(frame));
         if self.params.superpixels == 1 {
             return LabelPlane::uniform(frame.width(), frame.height(), Label(0));
+        }
+        if self.params.superpixels > 1 {
+            return self.temporal.push(frame);
         }
         let slab = match self.slab.take() {
             None => self.first(frame),
@@ -225,16 +234,14 @@ impl Segmenter {
         let rules = BorderRules { colors, spread, outline: OUTLINE, carried, loyalty: LOYALTY, frozen };
         settle(map, &rules, &self.simple, SWEEPS);
         give_birth(map, colors, frozen, population);
-        if self.params.superpixels == 0 {
-            dissolve_slivers(map, colors);
-        }
+        dissolve_slivers(map, colors);
         split_large(map, colors, population);
         // Places have changed: what motion brought no longer means anything.
         settle(map, &BorderRules { carried: &[], loyalty: 0.0, ..rules }, &self.simple, SWEEPS);
         thin_out(map, colors, population);
     }
 
-    /// Labels of the superpixels, by content if so wanted.
+    /// Labels of the superpixels, by content.
     fn label(
         &self,
         map: &mut Superpixels,
@@ -242,14 +249,12 @@ impl Segmenter {
         (colors, carried, frozen): (&[Lab], &[Option<Label>], &[bool]),
         next_label: &mut u32,
     ) -> LabelPlane {
-        let SegmentParams { superpixels, jump_levels: jump, hysteresis_levels: hysteresis, .. } = self.params;
-        if superpixels == 0 {
-            let rules = MergeRules { jump, hysteresis, worth: self.params.worth_levels };
-            let groups = merge(map, frame, rules);
-            name_regions(map, &groups, next_label);
-            polish(map, &PolishRules { colors, carried, frozen }, &self.simple);
-            dissolve_islands(map, self.params.min_area_px);
-        }
+        let SegmentParams { jump_levels: jump, hysteresis_levels: hysteresis, .. } = self.params;
+        let rules = MergeRules { jump, hysteresis, worth: self.params.worth_levels };
+        let groups = merge(map, frame, rules);
+        name_regions(map, &groups, next_label);
+        polish(map, &PolishRules { colors, carried, frozen }, &self.simple);
+        dissolve_islands(map, self.params.min_area_px);
         let label_of = |cell: &superpixels::Superpixel| cell.label.unwrap_or(Label(cell.id));
         let labels = map.plane.iter().map(|&cell| label_of(&map.cells[cell as usize])).collect();
         LabelPlane::new(frame.width(), frame.height(), labels)
@@ -259,18 +264,13 @@ impl Segmenter {
 impl Budget {
     fn new(raster: Raster, params: SegmentParams) -> Self {
         let pixels = raster.len() as f32;
-        // By content, detail may double the number; where a number is asked for, a tenth more spares the least distinct
-        // of the old ones while new content moves in.
-        let (spacing, detail) = if params.superpixels == 0 {
-            ((pixels / FINE_COUNT).sqrt().clamp(*FINE_SPACING_PX.start(), *FINE_SPACING_PX.end()), 2.0)
-        } else {
-            ((pixels / params.superpixels as f32).sqrt().max(1.0), 1.1)
-        };
+        let spacing = (pixels / FINE_COUNT).sqrt().clamp(*FINE_SPACING_PX.start(), *FINE_SPACING_PX.end());
         let area = spacing * spacing;
         let count = (pixels / area).round().max(1.0);
-        let max_count = (detail * count) as usize;
+        // Detail may double the number.
+        let max_count = (2.0 * count) as usize;
         let population = Population {
-            // Births and deaths below this are noise; where superpixels are meant to be tiny, a quarter of their size.
+            // Births and deaths below this are noise.
             min_area: params.min_area_px.min((area / 4.0) as u32),
             max_area: (3.0 * area) as u32,
             max_count,

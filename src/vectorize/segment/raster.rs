@@ -28,6 +28,12 @@ impl Raster {
         (p % self.width, p / self.width)
     }
 
+    /// The pixel at column `x`, row `y`; none outside the picture.
+    pub(super) fn index(self, x: i64, y: i64) -> Option<usize> {
+        let inside = (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y);
+        inside.then(|| y as usize * self.width + x as usize)
+    }
+
     /// The pixels that share a side with `p`: above, left, right, below.
     pub(super) fn sides(self, p: usize) -> impl Iterator<Item = usize> {
         let (x, y) = self.xy(p);
