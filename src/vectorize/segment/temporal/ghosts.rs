@@ -5,7 +5,7 @@
 //! In Chang, Wei and Fisher (CVPR 2013), §4.4, only the dead of the same frame come back; ours are remembered for
 //! longer, and move on with what is near and alike, as the Gaussian process of the motion would have it.
 
-use super::model::{Means, Model};
+use super::model::{Means, Model, Prior};
 use super::partition::{Partition, Superpixel};
 
 /// Frames that a dead superpixel is remembered: a third of a second.
@@ -18,7 +18,7 @@ const FARTHEST: f64 = 6.0;
 /// A superpixel that has died.
 #[derive(Debug, Clone)]
 pub(super) struct Ghost {
-    pub(super) id: u32,
+    id: u32,
     pub(super) means: Means,
     /// Frames since its death.
     pub(super) age: u32,
@@ -26,13 +26,23 @@ pub(super) struct Ghost {
 
 /// The dead, in order of death.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Ghosts(pub(super) Vec<Ghost>);
+pub(super) struct Ghosts(Vec<Ghost>);
 
 impl Ghosts {
     /// Remembers those among the dead that were there in the frame before, as they were then.
     pub(super) fn bury<'a>(&mut self, dead: impl IntoIterator<Item = &'a Superpixel>) {
         let known = dead.into_iter().filter_map(|superpixel| Some((superpixel.id, superpixel.prior?.means)));
         self.0.extend(known.map(|(id, means)| Ghost { id, means, age: 0 }));
+    }
+
+    /// The dead by name, with what is expected of them.
+    pub(super) fn known(&self, expect: impl Fn(&Ghost) -> Prior) -> Vec<(u32, Prior)> {
+        self.0.iter().map(|ghost| (ghost.id, expect(ghost))).collect()
+    }
+
+    /// Lets go of those who are back.
+    pub(super) fn forget(&mut self, risen: &[u32]) {
+        self.0.retain(|ghost| !risen.contains(&ghost.id));
     }
 
     /// Moves all to the next frame and forgets the oldest.

@@ -23,7 +23,7 @@ mod switch;
 mod tests;
 
 use flow::estimate_motion;
-use ghosts::Ghosts;
+use ghosts::{Ghost, Ghosts};
 use local::settle;
 use merge::{Bounds, merge};
 use model::{COLOR_STEPS, Color, Means, Model, Prior};
@@ -159,7 +159,7 @@ impl TemporalSuperpixels {
             settle(map, &self.model, &self.simple, &[], FIRST_SWEEPS);
             let missing = self.count.saturating_sub(map.superpixels.len()).div_ceil(round);
             let awake = vec![true; map.superpixels.len()];
-            let splits = find_splits(map, &self.model, &awake, i64::from(self.least_area));
+            let splits = find_splits(map, &self.model, &awake, &[], i64::from(self.least_area));
             let taken = missing.min(splits.len());
             split(map, &self.model, &splits[..taken], self.count);
             if let Some(last) = splits.get(taken.saturating_sub(1)) {
@@ -202,9 +202,13 @@ impl TemporalSuperpixels {
         for _ in 0..ROUNDS {
             merge(map, &self.model, &awake(map, frozen), bounds);
             ghosts.bury(&map.take_empty());
-            let splits = find_splits(map, &self.model, &awake(map, frozen), bounds.least_area);
-            let has_split = split(map, &self.model, &splits, most);
-            switch(map, &self.model, ghosts, |ghost| self.expect(ghost.means, ghost.age + 1));
+            let expect = |ghost: &Ghost| self.expect(ghost.means, ghost.age + 1);
+            let count = map.superpixels.len();
+            let dead = ghosts.known(expect);
+            let splits = find_splits(map, &self.model, &awake(map, frozen), &dead, bounds.least_area);
+            ghosts.forget(&split(map, &self.model, &splits, most));
+            let has_split = map.superpixels.len() > count;
+            switch(map, &self.model, ghosts, expect);
             settle(map, &self.model, &self.simple, frozen, SWEEPS);
             if !has_split {
                 break;

@@ -12,6 +12,9 @@ pub(super) type Color = [i16; 3];
 /// Steps to a unit of L*, a* or b*: finer than 8-bit sRGB nearly everywhere.
 pub(super) const COLOR_STEPS: f32 = 16.0;
 
+/// Names are taken from no farther than this, in spacings of superpixels.
+const REACH: f64 = 3.0;
+
 /// Sums over a set of pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Moments {
@@ -115,13 +118,19 @@ impl Model {
         price + self.area_energy(moments.area) + self.misfit(moments, prior)
     }
 
-    pub(super) fn area_energy(&self, area: i64) -> f64 {
+    /// Whether a dead or another superpixel, of this prior, may give its name to one of these pixels.
+    pub(super) fn is_near(&self, moments: &Moments, prior: &Prior) -> bool {
+        let (a, b) = (moments.centroid(), prior.means.place);
+        (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2) < REACH * REACH * self.mean_area
+    }
+
+    fn area_energy(&self, area: i64) -> f64 {
         let excess = area as f64 - self.mean_area;
         self.area_weight * excess * excess / self.mean_area
     }
 
     /// Squared distances of the pixels to the means and of the means to the prior, at the best means.
-    pub(super) fn misfit(&self, moments: &Moments, prior: Option<&Prior>) -> f64 {
+    fn misfit(&self, moments: &Moments, prior: Option<&Prior>) -> f64 {
         let steps = f64::from(COLOR_STEPS);
         let colors = (moments.color.map(|sum| sum as f64 / steps), moments.color2 as f64 / (steps * steps));
         let places = (moments.place.map(|sum| sum as f64), moments.place2 as f64);

@@ -115,6 +115,12 @@ impl Partition {
         self.superpixels.len() as u32 - 1
     }
 
+    /// Makes a dead superpixel of a new one: its name and what is known of it.
+    pub(super) fn name(&mut self, model: &Model, place: u32, id: u32, prior: Prior) {
+        self.superpixels[place as usize].id = id;
+        self.set_prior(model, place, Some(prior));
+    }
+
     /// Makes a new superpixel of an old one: another name, no prior.
     pub(super) fn rename(&mut self, model: &Model, place: u32) {
         self.superpixels[place as usize].id = self.next_id;

@@ -3,8 +3,12 @@
 //! In: a partition. Out: more superpixels at a lower energy; births of what has appeared are among them, as the pixels
 //! that a superpixel does not explain part from it. Forbidden here: single pixels between neighbours.
 //!
+//! A part that one of the dead explains takes its name, and is as cheap as an old superpixel.
+//!
 //! Halves are found by k-means for two (as in Chang, Wei and Fisher, CVPR 2013, §4.3), from the principal axis of the
 //! pixels in place and colour, and made connected.
+
+use std::collections::BTreeSet;
 
 use super::model::{COLOR_STEPS, Model, Moments, Prior};
 use super::partition::{Members, Partition};
@@ -15,7 +19,7 @@ const ROUNDS: usize = 4;
 const POWER_STEPS: usize = 6;
 
 /// A superpixel to be split.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) struct Split {
     /// By how much the objective falls.
     pub(super) gain: f64,
@@ -23,19 +27,27 @@ pub(super) struct Split {
     /// The pixels that part, and whether they keep the name.
     part: Vec<u32>,
     takes_name: bool,
+    /// Whose name the other side takes; none: a new one.
+    dead: Option<(u32, Prior)>,
 }
 
 /// Splits worth more than nothing, the best first. Superpixels that sleep, and halves of fewer than `least_area` pixels,
-/// are left alone.
-pub(super) fn find_splits(map: &Partition, model: &Model, is_awake: &[bool], least_area: i64) -> Vec<Split> {
+/// are left alone. None of the dead is taken twice.
+pub(super) fn find_splits(
+    map: &Partition,
+    model: &Model,
+    is_awake: &[bool],
+    dead: &[(u32, Prior)],
+    least_area: i64,
+) -> Vec<Split> {
     let members = map.members();
-    let mut halver = Halver { map, model, sides: vec![Side::Elsewhere; map.raster.len()], stack: Vec::new() };
+    let mut halver = Halver { map, model, dead, sides: vec![Side::Elsewhere; map.raster.len()], stack: Vec::new() };
     let mut found = Vec::new();
     for (place, superpixel) in map.superpixels.iter().enumerate().filter(|&(place, _)| is_awake[place]) {
         // The most there is to gain: all misfit and all excess of area.
         let most =
             superpixel.energy(model) - model.price * if superpixel.prior.is_some() { 1.0 } else { model.novelty };
-        if superpixel.moments.area >= 2 * least_area.max(1) && most > model.price * model.novelty {
+        if superpixel.moments.area >= 2 * least_area.max(1) && most > model.price {
             found.extend(halver.split(place as u32, &members).filter(|split| {
                 let part = split.part.len() as i64;
                 split.gain > 0.0 && part.min(superpixel.moments.area - part) >= least_area
@@ -43,19 +55,26 @@ pub(super) fn find_splits(map: &Partition, model: &Model, is_awake: &[bool], lea
         }
     }
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut taken = BTreeSet::new();
+    found.retain(|split| split.dead.is_none_or(|(id, _)| taken.insert(id)));
     found
 }
 
-/// Splits as found, up to `most` superpixels. Whether there was one.
-pub(super) fn split(map: &mut Partition, model: &Model, splits: &[Split], most: usize) -> bool {
+/// Splits as found, up to `most` superpixels. Which of the dead are back.
+pub(super) fn split(map: &mut Partition, model: &Model, splits: &[Split], most: usize) -> Vec<u32> {
     let room = most.saturating_sub(map.superpixels.len());
+    let mut risen = Vec::new();
     for split in splits.iter().take(room) {
         let part = map.part_off(model, split.place, &split.part);
+        if let Some((id, prior)) = split.dead {
+            map.name(model, part, id, prior);
+            risen.push(id);
+        }
         if split.takes_name {
             map.swap_identities(model, split.place, part);
         }
     }
-    room > 0 && !splits.is_empty()
+    risen
 }
 
 /// Where a pixel is while a superpixel is halved.
@@ -71,6 +90,7 @@ enum Side {
 struct Halver<'a> {
     map: &'a Partition,
     model: &'a Model,
+    dead: &'a [(u32, Prior)],
     sides: Vec<Side>,
     stack: Vec<u32>,
 }
@@ -148,17 +168,24 @@ impl Halver<'_> {
     fn judge(&self, place: u32, part: Vec<u32>) -> Split {
         let Self { map, model, .. } = *self;
         let whole = map.get(place);
+        let prior = whole.prior.as_ref();
         let moments = map.moments_of(&part);
         let rest = whole.moments.minus(moments);
-        let both = |named: &Moments, other: &Moments, prior: Option<&Prior>| {
-            model.energy(named, prior) + model.energy(other, None)
-        };
-        let prior = whole.prior.as_ref();
-        let (stays, goes) = (both(&rest, &moments, prior), both(&moments, &rest, prior));
-        let takes_name = goes < stays;
+        let (stays, goes) = (self.named_anew(&moments), self.named_anew(&rest));
+        let energies = [model.energy(&rest, prior) + stays.0, model.energy(&moments, prior) + goes.0];
+        let takes_name = energies[1] < energies[0];
+        let dead = if takes_name { goes.1 } else { stays.1 };
         let pairs: usize = part.iter().map(|&p| self.pairs_across(p as usize)).sum();
-        let gain = whole.energy(model) - stays.min(goes) - model.outline * pairs as f64;
-        Split { gain, place, part, takes_name }
+        let gain = whole.energy(model) - energies[0].min(energies[1]) - model.outline * pairs as f64;
+        Split { gain, place, part, takes_name, dead }
+    }
+
+    /// Energy of a superpixel that takes a new name or that of a dead one, whichever is better, and which.
+    fn named_anew(&self, moments: &Moments) -> (f64, Option<(u32, Prior)>) {
+        let near = self.dead.iter().filter(|(_, prior)| self.model.is_near(moments, prior));
+        let offers = near.map(|dead| (self.model.energy(moments, Some(&dead.1)), Some(*dead)));
+        let new = (self.model.energy(moments, None), None);
+        offers.fold(new, |best, offer| if offer.0 < best.0 { offer } else { best })
     }
 
     /// How many of the eight neighbours of a pixel of the part stay behind.

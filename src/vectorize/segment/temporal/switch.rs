@@ -19,8 +19,8 @@ struct Offer {
 }
 
 enum Name {
-    /// That of a dead one, by its number among them.
-    Dead(usize),
+    /// That of a dead one.
+    Dead(u32, Prior),
     /// That of the superpixel at this place, which takes the new one's.
     Living(u32),
 }
@@ -29,17 +29,17 @@ enum Name {
 /// of the dead.
 pub(super) fn switch(map: &mut Partition, model: &Model, ghosts: &mut Ghosts, expect: impl Fn(&Ghost) -> Prior) {
     renounce(map, model, ghosts);
-    let mut offers = from_the_dead(map, model, ghosts, &expect);
+    let mut offers = from_the_dead(map, model, &ghosts.known(expect));
     offers.extend(from_the_living(map, model));
     offers.sort_by(|a, b| a.change.total_cmp(&b.change));
-    let (mut is_named, mut has_risen) = (vec![false; map.superpixels.len()], vec![false; ghosts.0.len()]);
+    let (mut is_named, mut risen) = (vec![false; map.superpixels.len()], Vec::new());
     for Offer { place, name, .. } in offers {
         let here = place as usize;
         match name {
-            Name::Dead(number) if !is_named[here] && !has_risen[number] => {
-                map.superpixels[here].id = ghosts.0[number].id;
-                map.set_prior(model, place, Some(expect(&ghosts.0[number])));
-                (is_named[here], has_risen[number]) = (true, true);
+            Name::Dead(id, prior) if !is_named[here] && !risen.contains(&id) => {
+                map.name(model, place, id, prior);
+                is_named[here] = true;
+                risen.push(id);
             }
             Name::Living(other) if !is_named[here] && !is_named[other as usize] => {
                 map.swap_identities(model, place, other);
@@ -48,21 +48,12 @@ pub(super) fn switch(map: &mut Partition, model: &Model, ghosts: &mut Ghosts, ex
             _ => {}
         }
     }
-    let mut has_risen = has_risen.into_iter();
-    ghosts.0.retain(|_| has_risen.next() != Some(true));
+    ghosts.forget(&risen);
 }
-
-/// Names are taken from no farther than this, in spacings of superpixels.
-const REACH: f64 = 3.0;
 
 /// What a prior does to the energy of a superpixel of none; negative where it lowers it.
 fn change(superpixel: &Superpixel, model: &Model, prior: &Prior) -> f64 {
     model.energy(&superpixel.moments, Some(prior)) - model.energy(&superpixel.moments, None)
-}
-
-fn is_near(superpixel: &Superpixel, model: &Model, prior: &Prior) -> bool {
-    let (a, b) = (superpixel.moments.centroid(), prior.means.place);
-    (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2) < REACH * REACH * model.mean_area
 }
 
 /// Old superpixels that are better off as new ones give their names up, and these are among the dead.
@@ -76,14 +67,12 @@ fn renounce(map: &mut Partition, model: &Model, ghosts: &mut Ghosts) {
     }
 }
 
-fn from_the_dead(map: &Partition, model: &Model, ghosts: &Ghosts, expect: impl Fn(&Ghost) -> Prior) -> Vec<Offer> {
-    let priors: Vec<Prior> = ghosts.0.iter().map(expect).collect();
+fn from_the_dead(map: &Partition, model: &Model, dead: &[(u32, Prior)]) -> Vec<Offer> {
     let mut offers = Vec::new();
     for (place, superpixel) in new_ones(map) {
-        let near = priors.iter().enumerate().filter(|(_, prior)| is_near(superpixel, model, prior));
-        let all = near.map(|(number, prior)| (number, change(superpixel, model, prior)));
-        let better = all.filter(|(_, change)| *change < 0.0);
-        offers.extend(better.map(|(number, change)| Offer { change, place, name: Name::Dead(number) }));
+        let near = dead.iter().filter(|(_, prior)| model.is_near(&superpixel.moments, prior));
+        let all = near.map(|&(id, prior)| (change(superpixel, model, &prior), Name::Dead(id, prior)));
+        offers.extend(all.filter(|(change, _)| *change < 0.0).map(|(change, name)| Offer { change, place, name }));
     }
     offers
 }
@@ -92,7 +81,9 @@ fn from_the_living(map: &Partition, model: &Model) -> Vec<Offer> {
     let mut offers = Vec::new();
     for (place, superpixel) in new_ones(map) {
         for (other, old) in (0..).zip(&map.superpixels) {
-            let Some(prior) = old.prior.as_ref().filter(|prior| is_near(superpixel, model, prior)) else { continue };
+            let Some(prior) = old.prior.as_ref().filter(|prior| model.is_near(&superpixel.moments, prior)) else {
+                continue;
+            };
             let gain = change(superpixel, model, prior);
             if gain < 0.0 {
                 let change = gain - change(old, model, prior);

@@ -76,9 +76,10 @@ fn local_moves_lower_the_objective_and_tear_nothing() {
 fn a_split_gains_what_it_says() {
     let mut map = squares();
     let before = map.objective(&model());
-    let splits = find_splits(&map, &Model { price: 0.0, ..model() }, &[true; 9], 4);
+    let splits = find_splits(&map, &Model { price: 0.0, ..model() }, &[true; 9], &[], 4);
     let best = &splits[..1];
-    assert!(split(&mut map, &Model { price: 0.0, ..model() }, best, 10));
+    split(&mut map, &Model { price: 0.0, ..model() }, best, 10);
+    assert_eq!(map.superpixels.len(), 10);
     assert_connected(&map);
     let priced = model().price * model().novelty;
     let after = map.objective(&model());
