@@ -7,12 +7,6 @@ use crate::video::Frame;
 /// (L*, a*, b*), CIE 1976, white D65.
 pub(super) type Lab = [f32; 3];
 
-/// Squared distance of two colours (CIE76, squared).
-pub(super) fn distance2(a: Lab, b: Lab) -> f32 {
-    let d = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-}
-
 /// Steps of the table of the cube root; interpolation between them is off by less than 0.05 L* in the darkest tones.
 const ROOT_STEPS: usize = 4096;
 

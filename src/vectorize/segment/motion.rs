@@ -134,15 +134,16 @@ impl Block<'_> {
             .sum()
     }
 
+    /// The same where that reaches beyond a picture, whose last row and column stand for all further ones.
     fn difference_clamped(&self, from: [isize; 2], to: [isize; 2], side: isize) -> u32 {
-        let offsets = (0..side).flat_map(|dy| (0..side).map(move |dx| (dx, dy)));
-        offsets
-            .map(|(dx, dy)| {
-                let a = self.from.clamped(from[0] + dx, from[1] + dy);
-                let b = self.to.clamped(to[0] + dx, to[1] + dy);
-                u32::from(a.abs_diff(b))
-            })
-            .sum()
+        let columns = |x: isize| (x..x + side).map(|x| x.clamp(0, self.from.width as isize - 1) as usize);
+        let row = |gray: &'_ Gray, y: isize| y.clamp(0, gray.height as isize - 1) as usize * gray.width;
+        let difference = |dy: isize| {
+            let a = &self.from.pixels[row(self.from, from[1] + dy)..][..self.from.width];
+            let b = &self.to.pixels[row(self.to, to[1] + dy)..][..self.to.width];
+            columns(from[0]).zip(columns(to[0])).map(|(x, u)| u32::from(a[x].abs_diff(b[u]))).sum::<u32>()
+        };
+        (0..side).map(difference).sum()
     }
 }
 

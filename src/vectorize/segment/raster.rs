@@ -28,6 +28,12 @@ impl Raster {
         (p % self.width, p / self.width)
     }
 
+    /// The pixel at column `x`, row `y`; none outside the picture.
+    pub(super) fn index(self, x: i64, y: i64) -> Option<usize> {
+        let inside = (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y);
+        inside.then(|| y as usize * self.width + x as usize)
+    }
+
     /// The pixels that share a side with `p`: above, left, right, below.
     pub(super) fn sides(self, p: usize) -> impl Iterator<Item = usize> {
         let (x, y) = self.xy(p);
@@ -68,6 +74,14 @@ impl Raster {
     }
 }
 
+/// Columns and rows of a grid of about `count` cells on the picture, at most one cell a pixel.
+pub(super) fn grid(raster: Raster, count: u32) -> (usize, usize) {
+    let aspect = raster.width as f64 / raster.height as f64;
+    let columns = (f64::from(count) * aspect).sqrt().round().clamp(1.0, raster.width as f64);
+    let rows = (f64::from(count) / columns).round().clamp(1.0, raster.height as f64);
+    (columns as usize, rows as usize)
+}
+
 /// Whether a pixel may leave its region without disconnecting it, by which ring pixels (bit i: ring pixel i) belong to
 /// the region: those that share a side with it must hang together through the ring (simple points of digital topology,
 /// Kong and Rosenfeld 1989, for 4-connected regions). A pixel alone in its region may not leave.
@@ -100,7 +114,15 @@ fn arcs_with_a_side(mask: u8) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::{OUTSIDE, Raster, SimplePoints};
+    use super::{OUTSIDE, Raster, SimplePoints, grid};
+
+    #[test]
+    fn grids_have_about_the_asked_number_of_cells() {
+        assert_eq!(grid(Raster::new(640, 360), 3600), (80, 45));
+        assert_eq!(grid(Raster::new(1, 1), 100), (1, 1));
+        assert_eq!(grid(Raster::new(3, 1), 2), (2, 1));
+        assert_eq!(grid(Raster::new(100, 100), 1), (1, 1));
+    }
 
     #[test]
     fn ring_agrees_with_sides_everywhere() {

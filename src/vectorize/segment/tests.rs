@@ -161,6 +161,137 @@ fn superpixels_number_about_as_asked_last_and_hang_together() {
     assert!(mean_duration(&planes) > 5.0, "{}", mean_duration(&planes));
 }
 
+/// A ground with a texture that repeats nowhere, and before it a square of another at `left`, if any.
+fn square_frame(left: Option<f32>, side: f32) -> Frame {
+    draw(160, 96, |x, y| {
+        let top = 48.0 - side / 2.0;
+        match left {
+            Some(left) if (left..left + side).contains(&x) && (top..top + side).contains(&y) => {
+                let (u, v) = (x - left, y - top);
+                [200.0 + 30.0 * (u * 0.7).sin(), 120.0 + 40.0 * (v * 0.5 + u * 0.1).cos(), 40.0]
+            }
+            _ => [40.0 + 20.0 * (x * 0.13).sin(), 70.0 + 25.0 * (y * 0.17 + x * 0.03).cos(), 110.0],
+        }
+    })
+}
+
+fn superpixel_planes(frames: &[Frame], count: u32) -> Vec<LabelPlane> {
+    push_all(&mut Segmenter::new(frames[0].width(), frames[0].height(), SegmentParams::new(count)), frames)
+}
+
+/// Labels of most of whose pixels lie in the square at (left, 48 - side / 2).
+fn labels_in_square(plane: &LabelPlane, left: f32, side: f32) -> BTreeSet<Label> {
+    let is_inside = |p: usize| {
+        let (x, y) = ((p % 160) as f32 + 0.5, (p / 160) as f32 + 0.5);
+        (left..left + side).contains(&x) && (48.0 - side / 2.0..48.0 + side / 2.0).contains(&y)
+    };
+    let is_mostly_inside = |label: &Label| {
+        let pixels = plane.labels().iter().enumerate().filter(|(_, other)| *other == label);
+        let (inside, all) = pixels.fold((0, 0), |(inside, all), (p, _)| (inside + usize::from(is_inside(p)), all + 1));
+        2 * inside > all
+    };
+    labels_of(plane).into_iter().filter(is_mostly_inside).collect()
+}
+
+fn assert_connected(plane: &LabelPlane, what: &str) {
+    let labels = plane.labels();
+    let found = pieces(Raster::new(plane.width(), plane.height()), |_| true, |p, q| labels[p] == labels[q]);
+    assert_eq!(found.areas.len(), labels_of(plane).len(), "{what}: every superpixel in one piece");
+}
+
+#[test]
+fn superpixels_follow_a_fast_square() {
+    for step in [12.0, 31.0] {
+        let left = |k: usize| 12.0 + step * k as f32;
+        let frames: Vec<Frame> = (0..4).map(|k| square_frame(Some(left(k)), 32.0)).collect();
+        let planes = superpixel_planes(&frames, 120);
+        let first = labels_in_square(&planes[0], left(0), 32.0);
+        assert!(first.len() >= 4, "{} superpixels on the square", first.len());
+        for (k, plane) in planes.iter().enumerate() {
+            assert_connected(plane, &format!("step {step}, frame {k}"));
+            let kept = labels_in_square(plane, left(k), 32.0).intersection(&first).count();
+            assert!(10 * kept >= 9 * first.len(), "step {step}, frame {k}: {kept} of {}", first.len());
+        }
+    }
+}
+
+#[test]
+fn superpixels_are_the_same_in_every_run() {
+    let frames: Vec<Frame> = (0..4).map(|k| square_frame(Some(20.0 + 5.5 * k as f32), 30.0)).collect();
+    assert_eq!(superpixel_planes(&frames, 90), superpixel_planes(&frames, 90));
+}
+
+#[test]
+fn superpixels_are_born_where_something_appears_and_die_where_it_goes() {
+    let frames: Vec<Frame> =
+        [None, None, Some(60.0), Some(60.0), None, None].map(|left| square_frame(left, 36.0)).into();
+    let planes = superpixel_planes(&frames, 120);
+    let before = labels_of(&planes[1]);
+    let [born, kept] = [2, 3].map(|k| labels_in_square(&planes[k], 60.0, 36.0));
+    assert!(!born.is_empty() && born.is_disjoint(&before), "{born:?} are new");
+    assert_eq!(born, kept);
+    for plane in &planes[4..] {
+        assert!(labels_of(plane).is_disjoint(&born), "nothing is left of the square");
+    }
+    let far = |plane: &LabelPlane| [plane.label(5, 5), plane.label(150, 10), plane.label(8, 90)];
+    assert!(planes.iter().all(|plane| far(plane) == far(&planes[0])), "far away nothing happens");
+}
+
+#[test]
+fn superpixels_give_way_to_an_occluder_and_leave_what_it_uncovers() {
+    // The square moves over the ground by 9 pixels a frame: the ground before it goes, that behind it comes back.
+    let left = |k: usize| 10.0 + 9.0 * k as f32;
+    let frames: Vec<Frame> = (0..9).map(|k| square_frame(Some(left(k)), 32.0)).collect();
+    let planes = superpixel_planes(&frames, 120);
+    let square = labels_in_square(&planes[0], left(0), 32.0);
+    for (k, plane) in planes.iter().enumerate() {
+        let here = labels_in_square(plane, left(k), 32.0);
+        let strays = plane.labels().iter().enumerate().filter(|(p, label)| {
+            let (x, y) = ((p % 160) as f32 + 0.5, (p / 160) as f32 + 0.5);
+            let is_outside = x < left(k) - 2.0 || x > left(k) + 34.0 || (y - 48.0).abs() > 18.0;
+            is_outside && square.contains(label)
+        });
+        assert_eq!(strays.count(), 0, "frame {k}: the square's labels stay on it");
+        assert!(here.intersection(&square).count() * 10 >= square.len() * 9, "frame {k}");
+    }
+    // What was before the square at the start is covered in the middle and has died.
+    let covered = labels_in_square(&planes[0], left(4), 32.0);
+    assert!(!covered.is_empty() && labels_in_square(&planes[4], left(4), 32.0).is_disjoint(&covered));
+}
+
+#[test]
+fn an_old_label_comes_back_after_an_occlusion_of_one_frame() {
+    let flash = draw(160, 96, |x, y| {
+        if (40.0..90.0).contains(&x) && (24.0..72.0).contains(&y) {
+            [20.0, 230.0, 60.0]
+        } else {
+            [40.0 + 20.0 * (x * 0.13).sin(), 70.0 + 25.0 * (y * 0.17 + x * 0.03).cos(), 110.0]
+        }
+    });
+    let square = |left| square_frame(Some(left), 30.0);
+    let frames = [square(50.0), square(50.0), flash, square(50.0)];
+    let planes: [LabelPlane; 4] = superpixel_planes(&frames, 120).try_into().expect("four planes");
+    let before = labels_in_square(&planes[1], 50.0, 30.0);
+    let shares =
+        planes.map(|plane| plane.labels().iter().filter(|label| before.contains(label)).count() as f64 / 900.0);
+    assert!(shares[1] > 0.9 && shares[2] == 0.0, "{shares:?}");
+    assert!(shares[3] > 0.5, "{shares:?}");
+}
+
+#[test]
+fn noise_leaves_superpixels_of_a_still_picture_alone() {
+    let noise = |k: u32, x: u32, y: u32| ((x * 7 + y * 8191 + k * 104_729).wrapping_mul(2_654_435_761) >> 30) as u8;
+    let still = square_frame(Some(60.0), 36.0);
+    let frames: Vec<Frame> = (0..5)
+        .map(|k| {
+            let pixel = |x, y| still.pixels()[(y * 160 + x) as usize].map(|level| level + noise(k, x, y));
+            Frame::from_fn(160, 96, pixel).expect("size")
+        })
+        .collect();
+    let planes = superpixel_planes(&frames, 100);
+    assert!(planes.iter().all(|plane| *plane == planes[0]));
+}
+
 #[test]
 fn tiny_frames_and_noise_do_no_harm() {
     let level = |seed: u32| (seed.wrapping_mul(2_654_435_761) >> 24) as u8;
