@@ -18,8 +18,8 @@ pub(super) struct Bounds {
 impl Bounds {
     /// Whether a partition keeps to them.
     pub(super) fn hold(&self, map: &Partition) -> bool {
-        map.superpixels.len() <= self.most
-            && map.superpixels.iter().all(|superpixel| superpixel.moments.area >= self.least_area)
+        let mut areas = map.superpixels.iter().map(|superpixel| superpixel.moments.area).filter(|&area| area > 0);
+        areas.clone().count() <= self.most && areas.all(|area| area >= self.least_area)
     }
 }
 
@@ -56,6 +56,10 @@ pub(super) fn merge(map: &mut Partition, model: &Model, is_awake: &[bool], bound
             return;
         }
         map.pass_on(model, &heirs);
+        // What could merge further has its turn in the next frame.
+        if bounds.hold(map) {
+            return;
+        }
     }
 }
 

@@ -244,6 +244,9 @@ impl Partition {
             let below = &self.plane[(y + 1).min(height - 1) * width..][..width];
             for (x, &here) in row.iter().enumerate() {
                 let (left, right) = (x.saturating_sub(1), (x + 1).min(width - 1));
+                if [row[right], below[left], below[x], below[right]] == [here; 4] {
+                    continue;
+                }
                 if row[right] != here {
                     count(here, row[right], 1);
                 }

@@ -41,13 +41,16 @@ pub(super) fn find_splits(
     least_area: i64,
 ) -> Vec<Split> {
     let members = map.members();
-    let mut halver = Halver { map, model, dead, sides: vec![Side::Elsewhere; map.raster.len()], stack: Vec::new() };
+    let sides = vec![Side::Elsewhere; map.raster.len()];
+    let mut halver = Halver { map, model, dead: Vec::new(), sides, stack: Vec::new() };
     let mut found = Vec::new();
     for (place, superpixel) in map.superpixels.iter().enumerate().filter(|&(place, _)| is_awake[place]) {
-        // The most there is to gain: all misfit and all excess of area.
-        let most =
-            superpixel.energy(model) - model.price * if superpixel.prior.is_some() { 1.0 } else { model.novelty };
-        if superpixel.moments.area >= 2 * least_area.max(1) && most > model.price {
+        halver.dead.clear();
+        halver.dead.extend(dead.iter().filter(|(_, prior)| model.is_near(&superpixel.moments, prior)));
+        // The most there is to gain, all misfit and all excess of area, against the least there is to pay.
+        let price = |is_old: bool| if is_old { model.price } else { model.price * model.novelty };
+        let most = superpixel.energy(model) - price(superpixel.prior.is_some());
+        if superpixel.moments.area >= 2 * least_area.max(1) && most > price(!halver.dead.is_empty()) {
             found.extend(halver.split(place as u32, &members).filter(|split| {
                 let part = split.part.len() as i64;
                 split.gain > 0.0 && part.min(superpixel.moments.area - part) >= least_area
@@ -90,7 +93,8 @@ enum Side {
 struct Halver<'a> {
     map: &'a Partition,
     model: &'a Model,
-    dead: &'a [(u32, Prior)],
+    /// The dead near the superpixel that is halved.
+    dead: Vec<(u32, Prior)>,
     sides: Vec<Side>,
     stack: Vec<u32>,
 }
@@ -166,7 +170,7 @@ impl Halver<'_> {
 
     /// What a split is worth, with the name on the better side.
     fn judge(&self, place: u32, part: Vec<u32>) -> Split {
-        let Self { map, model, .. } = *self;
+        let (map, model) = (self.map, self.model);
         let whole = map.get(place);
         let prior = whole.prior.as_ref();
         let moments = map.moments_of(&part);
@@ -182,8 +186,7 @@ impl Halver<'_> {
 
     /// Energy of a superpixel that takes a new name or that of a dead one, whichever is better, and which.
     fn named_anew(&self, moments: &Moments) -> (f64, Option<(u32, Prior)>) {
-        let near = self.dead.iter().filter(|(_, prior)| self.model.is_near(moments, prior));
-        let offers = near.map(|dead| (self.model.energy(moments, Some(&dead.1)), Some(*dead)));
+        let offers = self.dead.iter().map(|dead| (self.model.energy(moments, Some(&dead.1)), Some(*dead)));
         let new = (self.model.energy(moments, None), None);
         offers.fold(new, |best, offer| if offer.0 < best.0 { offer } else { best })
     }
