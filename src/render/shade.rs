@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::{Vec3, Vec3A};
+use glam::{DVec2, Vec3, Vec3A};
 
 use super::scan::{GridPoint, center_distance};
 
@@ -57,8 +57,22 @@ impl Shade {
     /// The colour at a pixel's centre, held within that of the corners: in slivers the gradient amplifies rounding.
     #[inline]
     fn at(&self, column: usize, row: i32) -> Vec3A {
-        let [x, y] = center_distance(self.corner, column as i64, i64::from(row));
+        self.away(center_distance(self.corner, column as i64, i64::from(row)))
+    }
+
+    /// The colour so many pixels away from the corner.
+    #[inline]
+    fn away(&self, [x, y]: [f32; 2]) -> Vec3A {
         (self.color + self.right * x + self.down * y).max(self.low).min(self.high)
+    }
+
+    /// The mean over a part of a pixel, whose centroid is given from the pixel's centre: a linear field takes it there.
+    /// Clamped to [0, 255].
+    #[inline]
+    pub(super) fn mean(&self, column: i32, row: i32, centroid: DVec2) -> Vec3A {
+        let [x, y] = center_distance(self.corner, column.into(), row.into());
+        let color = self.away([x + centroid.x as f32, y + centroid.y as f32]);
+        color.clamp(Vec3A::ZERO, Vec3A::splat(255.0))
     }
 
     /// Paints `columns` (not empty, within `pixels`) of a row. Colours are clamped to [0, 255] pixel by pixel and
@@ -114,7 +128,7 @@ fn pack_step(channels: Vec3A) -> u64 {
 
 /// Rounds and clamps one colour.
 #[inline]
-fn pack(color: Vec3A) -> Rgb32 {
+pub(super) fn pack(color: Vec3A) -> Rgb32 {
     let [r, g, b] = (color + 0.5).clamp(Vec3A::ZERO, Vec3A::splat(255.0)).to_array().map(|v| v as i32 as u32);
     r | g << 8 | b << 16
 }
