@@ -26,12 +26,17 @@ const LEAST_AREA: f32 = 1.0 / 1024.0;
 type Rows = u32;
 const _: () = assert!(BAND_ROWS == Rows::BITS as usize);
 
+/// Columns that are passed over at once where none of their rows is wanted.
+const TILE: usize = 16;
+
 /// Crossed pixels of a band; reused from band to band.
 #[derive(Debug, Default)]
 pub(super) struct Crossed {
     rows: Range<i32>,
     /// The pixels of each column.
     columns: Vec<Rows>,
+    /// The rows with pixels in each [`TILE`] columns.
+    tiles: Vec<Rows>,
     /// One a column: how many pixels the columns before it have.
     before: Vec<u32>,
     /// One a pixel, by column and row: RGB times area, and area.
@@ -49,12 +54,15 @@ impl Crossed {
                 self.mark(view, triangle.corners[i], triangle.corners[(i + 1) % 3]);
             }
         }
+        let union = |columns: &[Rows]| columns.iter().fold(0, |union, rows| union | rows);
+        self.tiles.clear();
+        self.tiles.extend(self.columns.chunks(TILE).map(union));
         self.before.clear();
         let mut count = 0;
-        for rows in &self.columns {
-            self.before.push(count);
+        self.before.extend(self.columns.iter().map(|rows| {
             count += rows.count_ones();
-        }
+            count - rows.count_ones()
+        }));
         self.sums.clear();
         self.sums.resize(count as usize, Vec4::ZERO);
     }
@@ -66,20 +74,24 @@ impl Crossed {
         let shown = self.rows.start.max(view.picture.rows.start)..self.rows.end.min(view.picture.rows.end);
         let first = (top.y >> GRID_BITS).max(shown.start.into());
         let end = (-(-bottom.y >> GRID_BITS)).min(shown.end.into());
+        if first >= end {
+            return;
+        }
         let slope = (bottom.x - top.x) as f64 / (bottom.y - top.y) as f64;
-        let (low, high) = (top.x.min(bottom.x) as f64, top.x.max(bottom.x) as f64);
-        let at = |y: i64| (top.x as f64 + slope * (y - top.y) as f64).clamp(low, high);
+        let (low, high) = (top.x.min(bottom.x), top.x.max(bottom.x));
+        // Casts saturate.
+        let at = |y: i64| (top.x + (slope * (y - top.y) as f64) as i64).clamp(low, high);
+        let mut upper = if top.y >= first << GRID_BITS { top.x } else { at(first << GRID_BITS) };
         for row in first..end {
-            let (upper, lower) = (row << GRID_BITS, (row + 1) << GRID_BITS);
-            let upper = if top.y >= upper { top.x as f64 } else { at(upper) };
-            let lower = if bottom.y <= lower { bottom.x as f64 } else { at(lower) };
-            const PIXEL: f64 = 1.0 / (1u64 << GRID_BITS) as f64;
-            // Casts saturate.
-            let columns = (upper.min(lower) * PIXEL).floor() as i32..(upper.max(lower) * PIXEL).ceil() as i32;
-            let columns = columns.start.max(view.picture.columns.start)..columns.end.min(view.picture.columns.end);
-            for column in columns {
-                self.columns[column as usize] |= 1 << (row - i64::from(self.rows.start));
+            let y = (row + 1) << GRID_BITS;
+            let lower = if bottom.y <= y { bottom.x } else { at(y) };
+            let start = (upper.min(lower) >> GRID_BITS).max(view.picture.columns.start.into());
+            let end = (-(-upper.max(lower) >> GRID_BITS)).min(view.picture.columns.end.into());
+            let bit = 1 << (row - i64::from(self.rows.start));
+            if start < end {
+                self.columns[start as usize..end as usize].iter_mut().for_each(|rows| *rows |= bit);
             }
+            upper = lower;
         }
     }
 
@@ -95,19 +107,22 @@ impl Crossed {
         let from_first = Rows::MAX << (rows.start - self.rows.start);
         let within = from_first & Rows::MAX >> (self.rows.start + Rows::BITS as i32 - rows.end);
         let mut coverage = None;
-        for column in columns.clone() {
-            let marked = self.columns[column as usize];
-            let mut left = marked & within;
-            while left != 0 {
-                let row = left.trailing_zeros();
-                left &= left - 1;
-                let coverage =
-                    coverage.get_or_insert_with(|| Coverage::new(triangle.corners, [columns.start, rows.start]));
-                let place = self.rows.start + row as i32;
-                if let Some(part) = coverage.of(column, place) {
-                    let color = shade.mean(column, place, part.centroid);
-                    let pixel = self.before[column as usize] + (marked & ((1 << row) - 1)).count_ones();
-                    self.sums[pixel as usize] += color.extend(1.0) * part.area as f32;
+        let (start, end) = (columns.start as usize, columns.end as usize);
+        for tile in (start / TILE..=(end - 1) / TILE).filter(|&tile| self.tiles[tile] & within != 0) {
+            for column in start.max(tile * TILE)..end.min((tile + 1) * TILE) {
+                let marked = self.columns[column];
+                let mut left = marked & within;
+                while left != 0 {
+                    let row = left.trailing_zeros();
+                    left &= left - 1;
+                    let pixel = self.before[column] + (marked & ((1 << row) - 1)).count_ones();
+                    let place = [column as i32, self.rows.start + row as i32];
+                    let part = coverage
+                        .get_or_insert_with(|| Coverage::new(triangle.corners, [columns.start, rows.start]))
+                        .of(place);
+                    if part.area > 0.0 {
+                        self.sums[pixel as usize] += shade.integral(place, part).extend(part.area as f32);
+                    }
                 }
             }
         }

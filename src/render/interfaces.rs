@@ -4,7 +4,8 @@
 //! inside it, so what is known of control tets says all about every level ([`child_faces`]).
 
 use super::children::EDGES;
-use super::complex::{Complex, Stars};
+use super::complex::Complex;
+use crate::mesh::{FACES, FaceMap, VertexId};
 
 /// Bits of a tet's faces; bit i: the face that lacks corner i.
 pub(super) type Faces = u8;
@@ -12,38 +13,34 @@ pub(super) type Faces = u8;
 const ALL: Faces = 0b1111;
 
 /// Faces of control tets between labels.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Interfaces {
-    stars: Stars,
-    /// For each point how many labels share it.
-    shares: Vec<u32>,
     nodes: usize,
-    /// Whether a point is shared; nothing else is done as long as none is.
+    /// For each point whether it has a node.
+    has_node: Vec<bool>,
+    /// Whether labels share a point; nothing else is done as long as none do.
     shared: bool,
     /// One a tet.
     faces: Vec<Faces>,
+    /// Faces that one tet has shown so far, with that tet and the corner of it that they lack.
+    unpaired: FaceMap<(u32, u8)>,
 }
 
 impl Interfaces {
+    /// Of no tets.
+    pub(super) fn new() -> Self {
+        Self { nodes: 0, has_node: Vec::new(), shared: false, faces: Vec::new(), unpaired: FaceMap::new() }
+    }
+
     /// Takes in what `complex` gained since the last call.
     pub(super) fn extend(&mut self, complex: &Complex) {
-        self.shares.resize(complex.points.len(), 0);
+        self.has_node.resize(complex.points.len(), false);
         for node in &complex.nodes[self.nodes..] {
-            let shares = &mut self.shares[node.point as usize];
-            *shares += 1;
-            self.shared |= *shares > 1;
+            self.shared |= std::mem::replace(&mut self.has_node[node.point as usize], true);
         }
         self.nodes = complex.nodes.len();
-        if !self.shared {
-            return;
-        }
-        self.stars.extend(complex);
-        let first = self.faces.len();
-        self.faces.resize(complex.tets.len(), 0);
-        for tet in first..complex.tets.len() {
-            for lacking in 0..4 {
-                self.find_interface(complex, tet, lacking);
-            }
+        if self.shared {
+            self.pair_faces(complex);
         }
     }
 
@@ -58,25 +55,23 @@ impl Interfaces {
         self.faces.get(tet as usize).copied().unwrap_or(0)
     }
 
-    /// Marks the face of `tet` without the corner `lacking`, on both sides, if an earlier tet of another label has it
-    /// too. Whichever of the two comes last finds the other, and both labels have their nodes by then.
-    fn find_interface(&mut self, complex: &Complex, tet: usize, lacking: usize) {
-        let corners = complex.tets[tet].map(|node| complex.point(node));
-        let face = [1, 2, 3].map(|i| corners[(lacking + i) % 4]);
-        if face.iter().any(|&point| self.shares[point as usize] < 2) {
-            return;
-        }
-        let label = |tet: usize| complex.nodes[complex.tets[tet][0] as usize].label;
-        for (other, _) in self.stars.star(face[0]).take_while(|&(other, _)| other < tet) {
-            if label(other) == label(tet) {
-                continue;
-            }
-            let corners = complex.tets[other].map(|node| complex.point(node));
-            if face.iter().all(|point| corners.contains(point)) {
-                let opposite = (0..4).find(|&i| !face.contains(&corners[i]));
-                self.faces[other] |= opposite.map_or(0, |i| 1 << i);
-                self.faces[tet] |= 1 << lacking;
-                return;
+    /// Finds the neighbours of tets that are new here. Tets come in the order of a growing region, so few faces wait at
+    /// a time.
+    fn pair_faces(&mut self, complex: &Complex) {
+        let label = |tet: u32| complex.nodes[complex.tets[tet as usize][0] as usize].label;
+        let first = self.faces.len();
+        self.faces.resize(complex.tets.len(), 0);
+        for tet in first as u32..complex.tets.len() as u32 {
+            let corners = complex.tets[tet as usize].map(|node| VertexId(complex.point(node)));
+            for (lacking, face) in (0..).zip(FACES) {
+                let mut face = face.map(|i| corners[i]);
+                face.sort_unstable();
+                let Some((other, lacking_there)) = self.unpaired.insert(face, (tet, lacking)) else { continue };
+                self.unpaired.remove(face);
+                if label(other) != label(tet) {
+                    self.faces[tet as usize] |= 1 << lacking;
+                    self.faces[other as usize] |= 1 << lacking_there;
+                }
             }
         }
     }

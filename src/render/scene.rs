@@ -56,7 +56,7 @@ impl Scene {
             complex: Complex::default(),
             colors: Vec::new(),
             spans: Vec::new(),
-            interfaces: Interfaces::default(),
+            interfaces: Interfaces::new(),
             refiner: Refiner::default(),
             second: Second::default(),
             triangles: Vec::new(),

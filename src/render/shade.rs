@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use glam::{DVec2, Vec3, Vec3A};
+use glam::{Vec3, Vec3A};
 
+use super::coverage::Part;
 use super::scan::{GridPoint, center_distance};
 
 /// A pixel as it is painted: R in the lowest byte, then G, B.
@@ -57,22 +58,20 @@ impl Shade {
     /// The colour at a pixel's centre, held within that of the corners: in slivers the gradient amplifies rounding.
     #[inline]
     fn at(&self, column: usize, row: i32) -> Vec3A {
-        self.away(center_distance(self.corner, column as i64, i64::from(row)))
-    }
-
-    /// The colour so many pixels away from the corner.
-    #[inline]
-    fn away(&self, [x, y]: [f32; 2]) -> Vec3A {
+        let [x, y] = center_distance(self.corner, column as i64, i64::from(row));
         (self.color + self.right * x + self.down * y).max(self.low).min(self.high)
     }
 
-    /// The mean over a part of a pixel, whose centroid is given from the pixel's centre: a linear field takes it there.
-    /// Clamped to [0, 255].
+    /// The integral over a part of a pixel. The mean is the colour at the part's centroid, held within that of the
+    /// corners and [0, 255].
     #[inline]
-    pub(super) fn mean(&self, column: i32, row: i32, centroid: DVec2) -> Vec3A {
+    pub(super) fn integral(&self, [column, row]: [i32; 2], part: Part) -> Vec3A {
         let [x, y] = center_distance(self.corner, column.into(), row.into());
-        let color = self.away([x + centroid.x as f32, y + centroid.y as f32]);
-        color.clamp(Vec3A::ZERO, Vec3A::splat(255.0))
+        let area = part.area as f32;
+        let right = self.right * (x * area + part.moment.x as f32);
+        let down = self.down * (y * area + part.moment.y as f32);
+        let levels = |color: Vec3A| color.clamp(Vec3A::ZERO, Vec3A::splat(255.0)) * area;
+        (self.color * area + right + down).max(levels(self.low)).min(levels(self.high))
     }
 
     /// Paints `columns` (not empty, within `pixels`) of a row. Colours are clamped to [0, 255] pixel by pixel and
