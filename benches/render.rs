@@ -6,7 +6,7 @@
 use divan::{Bencher, counter::ItemsCount};
 use glam::{IVec3, Vec3};
 use tetvec::mesh::TetMesh;
-use tetvec::render::{Scene, sample, subdivide};
+use tetvec::render::{DrawParams, Scene, sample, subdivide};
 use tetvec::{PixelFormat, Plane, Surface, YuvMatrix};
 
 #[path = "../tests/render/meshes.rs"]
@@ -36,35 +36,43 @@ fn slab(cell: u32, labels: i32) -> TetMesh {
 }
 
 /// Draws all frames in order with one thread, from a scene that has refined nothing yet.
-fn play(mesh: &TetMesh, levels: u8, (width, height): (u32, u32), data: &mut [u8]) {
+fn play(mesh: &TetMesh, levels: u8, antialias: bool, (width, height): (u32, u32), data: &mut [u8]) {
+    let params = DrawParams { levels, antialias, viewport: None };
     let mut scene = Scene::new(mesh.domain);
     scene.extend(mesh);
     for frame in 0..FRAMES {
         let planes = vec![Plane { data, stride: 4 * width as usize }];
         let surface = Surface::try_new(PixelFormat::Rgbx, YuvMatrix::Bt601, (width, height), planes);
-        scene.draw(frame.into(), levels, None, &mut surface.expect("a surface")).expect("the whole picture");
+        scene.draw(frame.into(), &params, &mut surface.expect("a surface")).expect("the whole picture");
     }
 }
 
-fn bench_play(bencher: Bencher<'_, '_>, mesh: &TetMesh, levels: u8, size: (u32, u32)) {
+fn bench_play(bencher: Bencher<'_, '_>, mesh: &TetMesh, levels: u8, antialias: bool, size: (u32, u32)) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread pool");
     let mut data = vec![0; 4 * (size.0 * size.1) as usize];
-    bencher.counter(ItemsCount::new(FRAMES)).bench_local(|| pool.install(|| play(mesh, levels, size, &mut data)));
+    bencher
+        .counter(ItemsCount::new(FRAMES))
+        .bench_local(|| pool.install(|| play(mesh, levels, antialias, size, &mut data)));
 }
 
 #[divan::bench(args = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (2, 0)], sample_count = 3, sample_size = 1)]
 fn play_14000_tets(bencher: Bencher<'_, '_>, (levels, size): (u8, usize)) {
-    bench_play(bencher, &slab(10, 1), levels, SIZES[size]);
+    bench_play(bencher, &slab(10, 1), levels, true, SIZES[size]);
 }
 
-#[divan::bench(args = [(0, 0), (1, 0), (1, 1)], sample_count = 3, sample_size = 1)]
+#[divan::bench(args = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)], sample_count = 3, sample_size = 1)]
 fn play_14000_tets_20_labels(bencher: Bencher<'_, '_>, (levels, size): (u8, usize)) {
-    bench_play(bencher, &slab(10, 20), levels, SIZES[size]);
+    bench_play(bencher, &slab(10, 20), levels, true, SIZES[size]);
+}
+
+#[divan::bench(args = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2)], sample_count = 3, sample_size = 1)]
+fn play_14000_tets_20_labels_as_stairs(bencher: Bencher<'_, '_>, (levels, size): (u8, usize)) {
+    bench_play(bencher, &slab(10, 20), levels, false, SIZES[size]);
 }
 
 #[divan::bench(args = [(0, 0), (1, 0), (1, 1), (1, 2)], sample_count = 3, sample_size = 1)]
 fn play_62000_tets(bencher: Bencher<'_, '_>, (levels, size): (u8, usize)) {
-    bench_play(bencher, &slab(5, 1), levels, SIZES[size]);
+    bench_play(bencher, &slab(5, 1), levels, true, SIZES[size]);
 }
 
 /// Where a frame's pixels lie in the mesh, for the fit.

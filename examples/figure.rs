@@ -26,7 +26,7 @@ use stream::Packets;
 use tetvec::bitstream::{Limits, ParseError, SlabParser};
 use tetvec::mesh::TetMesh;
 use tetvec::metrics::Difference;
-use tetvec::render::{cross_section, draw};
+use tetvec::render::{DrawParams, cross_section, draw};
 use tetvec::{Frame, Surface, Viewport};
 
 /// Draws a frame beside its vectorised form.
@@ -80,7 +80,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
     let levels = arguments.levels.unwrap_or(slab.levels);
     let mut ours = original.clone();
-    draw(&slab.mesh, slab.time, levels, None, &mut Surface::of_frame(&mut ours))?;
+    let params = DrawParams { levels, antialias: true, viewport: None };
+    draw(&slab.mesh, slab.time, &params, &mut Surface::of_frame(&mut ours))?;
 
     let scale = arguments.scale.unwrap_or((PANEL_WIDTH / size.0).max(1));
     let panel = (size.0 * scale, size.1 * scale);
@@ -170,7 +171,8 @@ fn read_slab(path: &Path, frame: u32) -> Result<Slab, Box<dyn Error>> {
 fn zoomed(slab: &Slab, levels: u8, region: Region, zoom: u32) -> Result<RgbImage, Box<dyn Error>> {
     let (width, height) = region.size(zoom);
     let mut picture = Frame::from_fn(width, height, |_, _| [0; 3])?;
-    draw(&slab.mesh, slab.time, levels, Some(region.viewport()), &mut Surface::of_frame(&mut picture))?;
+    let params = DrawParams { levels, antialias: true, viewport: Some(region.viewport()) };
+    draw(&slab.mesh, slab.time, &params, &mut Surface::of_frame(&mut picture))?;
     Ok(panels::enlarge(&picture, 1))
 }
 

@@ -43,6 +43,9 @@ struct Arguments {
     /// Levels of subdivision, 0 to 2; as the stream says if not given.
     #[arg(long, value_parser = clap::value_parser!(u8).range(0..=2))]
     levels: Option<u8>,
+    /// Leave edges between labels as stairs of pixels.
+    #[arg(long)]
+    no_antialias: bool,
     /// The part of the picture to draw, in its pixels: x,y,width,height.
     #[arg(long, value_parser = parse_viewport)]
     viewport: Option<Viewport>,
@@ -111,7 +114,11 @@ struct Drawing<'a> {
 
 impl<'a> Drawing<'a> {
     fn new(arguments: &'a Arguments, times: &'a Times, is_file: bool, progress: ProgressBar) -> Self {
-        let config = DecoderConfig { subdivision_levels: arguments.levels, threads: arguments.threads };
+        let config = DecoderConfig {
+            subdivision_levels: arguments.levels,
+            antialias: !arguments.no_antialias,
+            threads: arguments.threads,
+        };
         Self {
             arguments,
             times,

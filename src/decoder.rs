@@ -6,16 +6,24 @@ use thiserror::Error;
 
 use crate::bitstream::{Limits, ParseError, SequenceHeader, SlabParser};
 pub use crate::render::Viewport;
-use crate::render::{Scene, ViewportError};
+use crate::render::{DrawParams, Scene, ViewportError};
 use crate::video::Surface;
 
 /// How a [`Decoder`] works.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DecoderConfig {
     /// Levels of subdivision to draw with; `None`: as the stream says.
     pub subdivision_levels: Option<u8>,
+    /// Whether edges between labels are drawn smooth; without, they are stairs of pixels.
+    pub antialias: bool,
     /// Worker threads; 0: all cores. Pixels do not depend on it.
     pub threads: usize,
+}
+
+impl Default for DecoderConfig {
+    fn default() -> Self {
+        Self { subdivision_levels: None, antialias: true, threads: 0 }
+    }
 }
 
 /// What a packet brought.
@@ -133,12 +141,13 @@ impl Decoder {
             return Err(DecodeError::NoKeyframe);
         };
         let levels = self.config.subdivision_levels.unwrap_or(header.subdivision_levels).min(MAX_LEVELS);
+        let params = DrawParams { levels, antialias: self.config.antialias, viewport };
         let frame = (frame - slab.first_frame as f64).min(slab.last_frame);
         #[cfg(feature = "threads")]
         if let Some(pool) = &self.pool {
-            return Ok(pool.install(|| slab.scene.draw(frame, levels, viewport, surface))?);
+            return Ok(pool.install(|| slab.scene.draw(frame, &params, surface))?);
         }
-        Ok(slab.scene.draw(frame, levels, viewport, surface)?)
+        Ok(slab.scene.draw(frame, &params, surface)?)
     }
 
     /// Forgets everything and waits for a keyframe.

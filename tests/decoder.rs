@@ -8,6 +8,7 @@ mod meshes;
 use meshes::{MeshParams, irregular_mesh};
 use tetvec::bitstream::{Fraction, SequenceHeader, SlabWriter};
 use tetvec::mesh::{Domain, TetMesh};
+use tetvec::render::DrawParams;
 use tetvec::{
     DecodeError, Decoder, DecoderConfig, Packet, PixelFormat, Plane, SequenceHeader as Header, Surface, Viewport,
     YuvMatrix,
@@ -43,7 +44,7 @@ fn picture(decoder: &mut Decoder, frame: f64) -> Result<Vec<u8>, DecodeError> {
 }
 
 fn decoder(levels: u8) -> Decoder {
-    Decoder::new(DecoderConfig { subdivision_levels: Some(levels), threads: 0 })
+    Decoder::new(DecoderConfig { subdivision_levels: Some(levels), ..DecoderConfig::default() })
 }
 
 /// What is drawn right after frame k's packet is what is drawn when all packets have come: packets bring all that a
@@ -80,7 +81,8 @@ fn pictures_are_those_of_the_coded_mesh() {
             let mut data = vec![0; found.len()];
             let planes = vec![Plane { data: &mut data, stride: 3 * SIZE.0 as usize }];
             let mut surface = Surface::try_new(PixelFormat::Rgb, YuvMatrix::Bt601, SIZE, planes).expect("a surface");
-            tetvec::render::draw(&mesh, frame, levels, None, &mut surface).expect("the whole picture");
+            let params = DrawParams { levels, antialias: true, viewport: None };
+            tetvec::render::draw(&mesh, frame, &params, &mut surface).expect("the whole picture");
             // Numbering differs, and with it the order of sums: by a rounding at most.
             let off = found.iter().zip(&data).filter(|(a, b)| a.abs_diff(**b) > 1).count();
             assert_eq!(off, 0, "level {levels} at {frame}");

@@ -311,6 +311,18 @@ fn late_pictures_are_left_out_and_reported() {
 }
 
 #[test]
+fn edges_between_labels_can_be_left_as_stairs() {
+    let labelled = run(&format!("{} ! tetvecenc superpixels=8", raw(2))).expect_clean().bytes();
+    let file = TempFile::new(&labelled);
+    let play = |settings: &str| {
+        let caps = "video/x-raw,format=RGB,width=96,height=64";
+        run(&format!("{} ! tetvecparse ! tetvecdec {settings} ! {caps}", file.source())).expect_clean().bytes()
+    };
+    assert_eq!(play("antialias=true"), play(""));
+    assert_ne!(play("antialias=false"), play(""));
+}
+
+#[test]
 fn the_level_of_subdivision_and_the_threads_can_be_set() {
     let file = TempFile::new(&stream(2));
     let play = |settings: &str| {

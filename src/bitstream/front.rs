@@ -6,8 +6,7 @@
 use glam::{DVec3, IVec3};
 
 use super::MeshFault;
-use super::face_map::FaceMap;
-use crate::mesh::VertexId;
+use crate::mesh::{FaceMap, VertexId};
 
 /// End of a list.
 const NONE: u32 = u32::MAX;

@@ -6,7 +6,6 @@
 mod colors;
 mod connectivity;
 mod error;
-mod face_map;
 mod framing;
 mod front;
 mod header;

@@ -9,11 +9,10 @@ use glam::IVec3;
 
 use super::colors::{Steps, to_steps};
 use super::connectivity::Apex;
-use super::face_map::FaceMap;
 use super::range_coder::{BitCoder, BitModel, RangeEncoder};
 use super::slab::Side;
 use super::{MeshFault, WriteError};
-use crate::mesh::{FACES, MeshError, TetMesh, VertexId};
+use crate::mesh::{FACES, FaceMap, MeshError, TetMesh, VertexId};
 use crate::video::Label;
 
 /// No tet, or no vertex.

@@ -5,6 +5,7 @@
 
 mod adjacency;
 mod domain;
+mod face_map;
 mod ids;
 mod predicates;
 mod tet_mesh;
@@ -12,6 +13,7 @@ mod validate;
 
 pub use adjacency::{FACES, StarTable};
 pub use domain::{Domain, Sides};
+pub(crate) use face_map::FaceMap;
 pub use ids::{VertexId, WedgeId};
 pub use predicates::volume6;
 pub use tet_mesh::{TetMesh, Wedge};

@@ -1,7 +1,7 @@
 //! From a slab's control mesh to pixels: subdivide, slice at a time, fill, pack into the pixel format.
 //!
 //! ```text
-//! complex -> rings -> level | refiner -> slice -> scan, shade -> pack
+//! complex -> rings -> level | refiner -> slice -> scan, shade -> crossed -> pack
 //! ```
 //!
 //! In: a mesh, a time, a size. Out: pixels; for the fit also masks ([`color_masks`], [`position_masks`]) and where
@@ -11,7 +11,10 @@
 
 mod children;
 mod complex;
+mod coverage;
+mod crossed;
 mod draw;
+mod interfaces;
 mod level;
 mod masks;
 mod pack;
@@ -29,7 +32,7 @@ mod subdivide;
 mod view;
 
 pub use complex::{FINE_BITS, Node};
-pub use draw::draw;
+pub use draw::{DrawParams, draw};
 pub use masks::{Masks, color_masks, position_masks};
 pub use sample::{PixelSamples, sample};
 pub use scene::Scene;

@@ -6,6 +6,7 @@ use glam::IVec3;
 
 use super::draw::triangulate;
 use super::scan::{GridPoint, scan};
+use super::scene::Polygon;
 use super::slice::{SLICES, above, cross};
 use super::subdivide::Refined;
 use super::view::{View, Viewport, plane};
@@ -27,7 +28,7 @@ impl PixelSamples {
 
 /// Samples the plane at time `frame` (frames since the slab's first) at the centres of the source's pixels in `rows`
 /// (cut to the picture's height). At each pixel it is the tet that [`super::Scene::draw`] would show at the size of
-/// the source.
+/// the source, without anti-aliasing.
 pub fn sample(refined: &Refined, domain: &Domain, frame: f64, rows: Range<u32>) -> PixelSamples {
     let view = View::new(domain, Viewport::whole(domain), (domain.width, domain.height));
     let t = plane(domain, frame);
@@ -55,7 +56,7 @@ fn sample_tet(tet: [IVec3; 4], t: i32, view: &View, rows: Range<i32>, mut pixel:
         parts[i] = part;
         polygon[i] = (place, glam::Vec3::ZERO);
     }
-    triangulate(view, &polygon[..ends.len()], |triangle, picked| {
+    triangulate(view, Polygon { corners: &polygon[..ends.len()], boundary: 0 }, |triangle, picked| {
         let Some(own) = triangle.rows(view) else { return };
         let both = own.start.max(rows.start)..own.end.min(rows.end);
         scan(triangle.corners, both, |row, columns| {

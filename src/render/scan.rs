@@ -6,6 +6,8 @@
 
 use std::ops::Range;
 
+use glam::DVec2;
+
 /// Binary digits of the grid after the point: 2^-20 px. Snapping may turn over a triangle thinner than that; it is then
 /// skipped, and a pixel whose centre lies within so thin a strip is drawn by both neighbours.
 pub(super) const GRID_BITS: u32 = 20;
@@ -44,6 +46,13 @@ pub(super) fn center_distance(from: GridPoint, column: i64, row: i64) -> [f32; 2
     [distance(column, from.x), distance(row, from.y)]
 }
 
+/// Where a point lies from a pixel's centre (column, row), in pixels.
+#[inline]
+pub(super) fn center_offset(point: GridPoint, [column, row]: [i32; 2]) -> DVec2 {
+    let offset = |v: i64, pixel: i32| (v - ((i64::from(pixel) << GRID_BITS) + HALF)) as f64;
+    DVec2::new(offset(point.x, column), offset(point.y, row)) / ONE as f64
+}
+
 /// Whether the corners turn from +x to +y, as slices of positive tets do; false if they are in line.
 #[inline]
 pub(super) fn is_positive([a, b, c]: [GridPoint; 3]) -> bool {
@@ -66,6 +75,18 @@ pub(super) fn bounds(corners: &[GridPoint; 3], columns: i32, rows: i32) -> Optio
     };
     cut(corners.map(|c| c.x), columns)?;
     cut(corners.map(|c| c.y), rows)
+}
+
+/// Columns (below `columns`) and rows (among `rows`) of pixels that the triangle's bounds touch; `None` if there are
+/// none.
+#[inline]
+pub(super) fn touched(corners: &[GridPoint; 3], columns: i32, rows: Range<i32>) -> Option<(Range<i32>, Range<i32>)> {
+    let cut = |values: [i64; 3], pixels: Range<i32>| {
+        let first = (values[0].min(values[1]).min(values[2]) >> GRID_BITS).max(pixels.start.into());
+        let end = (-(-values[0].max(values[1]).max(values[2]) >> GRID_BITS)).min(pixels.end.into());
+        (first < end).then_some(first as i32..end as i32)
+    };
+    cut(corners.map(|c| c.x), 0..columns).zip(cut(corners.map(|c| c.y), rows))
 }
 
 /// Calls `span(row, columns)` for each of `rows` in which the triangle covers centres; columns are not cut to the

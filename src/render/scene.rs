@@ -4,10 +4,11 @@ use glam::{DVec2, IVec3, Vec3};
 
 use super::complex::{Complex, FINE_BITS};
 use super::draw::Placed;
+use super::interfaces::{Faces, Interfaces, child_faces};
 use super::parallel::fill_chunks;
 use super::refiner::{FineNode, Refiner, Span, fine_color};
 use super::second::Second;
-use super::slice::{SLICES, above, blend, cross};
+use super::slice::{SLICES, above, blend, cross, edges_on};
 use crate::mesh::{Domain, TetMesh};
 
 /// First-level children that the second level may hold before it starts anew; or four times what a picture needs, if
@@ -25,6 +26,8 @@ pub struct Scene {
     /// One a node, in fine levels.
     colors: Vec<IVec3>,
     spans: Vec<Span>,
+    /// As of the last anti-aliased picture.
+    interfaces: Interfaces,
     /// Level 1; empty until it is first asked for.
     refiner: Refiner,
     /// Level 2, around the planes lately drawn.
@@ -36,6 +39,15 @@ pub struct Scene {
 /// A polygon's corner: its place in fine units, and its colour.
 pub(super) type Corner = (DVec2, Vec3);
 
+/// A tet's part of a slice.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Polygon<'a> {
+    /// 3 or 4; convex.
+    pub(super) corners: &'a [Corner],
+    /// Edges that lie between labels, as far as interfaces are known; bit i: the edge from corner i to the next.
+    pub(super) boundary: u8,
+}
+
 impl Scene {
     /// A scene without tets.
     pub fn new(domain: Domain) -> Self {
@@ -44,6 +56,7 @@ impl Scene {
             complex: Complex::default(),
             colors: Vec::new(),
             spans: Vec::new(),
+            interfaces: Interfaces::new(),
             refiner: Refiner::default(),
             second: Second::default(),
             triangles: Vec::new(),
@@ -76,22 +89,28 @@ impl Scene {
         self.spans.extend(self.complex.tets[tets..].iter().map(span));
     }
 
+    /// Brings what is known of interfaces up to date. False if there are none.
+    pub(super) fn find_interfaces(&mut self) -> bool {
+        self.interfaces.extend(&self.complex);
+        self.interfaces.any()
+    }
+
     /// Cuts the scene, subdivided `levels` times, at `t` (fine units). `make` appends to a list what the caller keeps
-    /// of each polygon, given the control tet and the corners. Lists, one after the other, hold polygons in the order
+    /// of each polygon, given the control tet. Lists, one after the other, hold polygons in the order
     /// of control tets and of children; what was in them is gone.
     pub(super) fn cut<P: Send>(
         &mut self,
         t: i32,
         levels: u8,
         lists: &mut Vec<Vec<P>>,
-        make: impl Fn(&mut Vec<P>, u32, &[Corner]) + Sync + Send,
+        make: impl Fn(&mut Vec<P>, u32, Polygon<'_>) + Sync + Send,
     ) {
         if levels == 0 {
             let tets = (0..self.spans.len() as u32).filter(|&tet| self.spans[tet as usize].is_cut(t));
             let tets: Vec<u32> = tets.collect();
             return collect(lists, &tets, |polygons, tet| {
                 let nodes = self.complex.tets[tet as usize].map(|node| self.node(node));
-                slice(nodes, t, |corners| make(polygons, tet, corners));
+                slice(nodes, t, self.interfaces.faces(tet), |polygon| make(polygons, tet, polygon));
             });
         }
         self.refiner.extend(&self.complex);
@@ -102,15 +121,19 @@ impl Scene {
                 self.second = Second::default();
             }
             return collect(lists, &tets, |polygons, tet| {
-                slice_children(&self.refiner, &self.complex, tet, t, |corners| make(polygons, tet, corners));
+                let parent = Parent { level: (&self.refiner, &self.complex), tet, faces: self.interfaces.faces(tet) };
+                parent.slice_children(t, |polygon| make(polygons, tet, polygon));
             });
         }
         self.refine_twice(t);
         let tets = self.second.cut(t);
         let second = &self.second;
         collect(lists, &tets, |polygons, tet| {
-            let (refiner, complex) = second.level();
-            slice_children(refiner, complex, tet, t, |corners| make(polygons, second.parent(tet), corners));
+            let control = second.parent(tet);
+            let child = self.refiner.children(control)[tet as usize % 8];
+            let faces = child_faces(child, self.interfaces.faces(control));
+            let parent = Parent { level: second.level(), tet, faces };
+            parent.slice_children(t, |polygon| make(polygons, control, polygon));
         });
     }
 
@@ -158,18 +181,28 @@ fn collect<P: Send>(lists: &mut Vec<Vec<P>>, tets: &[u32], work: impl Fn(&mut Ve
     fill_chunks(lists, tets.len(), CHUNK, |list, run| tets[run].iter().for_each(|&tet| work(list, tet)));
 }
 
-/// Slices the children of a refined parent.
-#[inline]
-fn slice_children(refiner: &Refiner, complex: &Complex, tet: u32, t: i32, mut polygon: impl FnMut(&[Corner])) {
-    let nodes = refiner.ten(complex, tet);
-    for child in refiner.children(tet) {
-        slice(child.map(|i| nodes[i as usize]), t, &mut polygon);
+/// A refined tet.
+struct Parent<'a> {
+    level: (&'a Refiner, &'a Complex),
+    tet: u32,
+    /// Its faces between labels.
+    faces: Faces,
+}
+
+impl Parent<'_> {
+    #[inline]
+    fn slice_children(&self, t: i32, mut polygon: impl FnMut(Polygon<'_>)) {
+        let (refiner, complex) = self.level;
+        let nodes = refiner.ten(complex, self.tet);
+        for child in refiner.children(self.tet) {
+            slice(child.map(|i| nodes[i as usize]), t, child_faces(*child, self.faces), &mut polygon);
+        }
     }
 }
 
 /// Slices one tet.
 #[inline]
-fn slice(nodes: [FineNode; 4], t: i32, mut polygon: impl FnMut(&[Corner])) {
+fn slice(nodes: [FineNode; 4], t: i32, faces: Faces, mut polygon: impl FnMut(Polygon<'_>)) {
     let edges = SLICES[above(nodes.map(|node| node.position), t)];
     if edges.is_empty() {
         return;
@@ -180,5 +213,5 @@ fn slice(nodes: [FineNode; 4], t: i32, mut polygon: impl FnMut(&[Corner])) {
         let (part, place) = cross(below.position, above.position, t);
         *corner = (place, blend(below.levels(), above.levels(), part));
     }
-    polygon(&corners[..edges.len()]);
+    polygon(Polygon { corners: &corners[..edges.len()], boundary: edges_on(edges, faces) });
 }

@@ -32,8 +32,8 @@ pub fn cross_section(mesh: &TetMesh, frame: f64, levels: u8) -> Vec<SectionPolyg
         polygons.push(SectionPolygon {
             tet,
             label: mesh.tet_label(tet as usize),
-            corners: polygon.iter().map(|(place, _)| *place / fine).collect(),
-            colors: polygon.iter().map(|(_, color)| *color).collect(),
+            corners: polygon.corners.iter().map(|(place, _)| *place / fine).collect(),
+            colors: polygon.corners.iter().map(|(_, color)| *color).collect(),
         });
     });
     lists.concat()

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use glam::{Vec3, Vec3A};
 
+use super::coverage::Part;
 use super::scan::{GridPoint, center_distance};
 
 /// A pixel as it is painted: R in the lowest byte, then G, B.
@@ -61,6 +62,18 @@ impl Shade {
         (self.color + self.right * x + self.down * y).max(self.low).min(self.high)
     }
 
+    /// The integral over a part of a pixel. The mean is the colour at the part's centroid, held within that of the
+    /// corners and [0, 255].
+    #[inline]
+    pub(super) fn integral(&self, [column, row]: [i32; 2], part: Part) -> Vec3A {
+        let [x, y] = center_distance(self.corner, column.into(), row.into());
+        let area = part.area as f32;
+        let right = self.right * (x * area + part.moment.x as f32);
+        let down = self.down * (y * area + part.moment.y as f32);
+        let levels = |color: Vec3A| color.clamp(Vec3A::ZERO, Vec3A::splat(255.0)) * area;
+        (self.color * area + right + down).max(levels(self.low)).min(levels(self.high))
+    }
+
     /// Paints `columns` (not empty, within `pixels`) of a row. Colours are clamped to [0, 255] pixel by pixel and
     /// rounded to the nearest level.
     #[inline]
@@ -114,7 +127,7 @@ fn pack_step(channels: Vec3A) -> u64 {
 
 /// Rounds and clamps one colour.
 #[inline]
-fn pack(color: Vec3A) -> Rgb32 {
+pub(super) fn pack(color: Vec3A) -> Rgb32 {
     let [r, g, b] = (color + 0.5).clamp(Vec3A::ZERO, Vec3A::splat(255.0)).to_array().map(|v| v as i32 as u32);
     r | g << 8 | b << 16
 }

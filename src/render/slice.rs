@@ -2,6 +2,8 @@
 
 use glam::{DVec2, IVec3, Vec3};
 
+use super::interfaces::Faces;
+
 /// Edges that the plane crosses, as (corner below, corner above), for each set of corners above (bit i: corner i).
 /// Slices of positive tets turn from +x to +y.
 pub(super) const SLICES: [&[[u8; 2]]; 16] = [
@@ -27,6 +29,17 @@ pub(super) const SLICES: [&[[u8; 2]]; 16] = [
 #[inline]
 pub(super) fn above(corners: [IVec3; 4], t: i32) -> usize {
     corners.iter().enumerate().map(|(i, corner)| usize::from(corner.z >= t) << i).sum()
+}
+
+/// Which edges of a slice lie on `faces` of its tet; bit i: the edge from corner i to the next. The ends of the edges
+/// that two neighbouring corners lie on are the corners of a face.
+#[inline]
+pub(super) fn edges_on(slice: &[[u8; 2]], faces: Faces) -> u8 {
+    if faces == 0 {
+        return 0;
+    }
+    let ends = |i: usize| slice[i % slice.len()].iter().fold(0, |ends: Faces, end| ends | 1 << end);
+    (0..slice.len()).map(|i| u8::from(faces & !(ends(i) | ends(i + 1)) != 0) << i).sum()
 }
 
 /// Where the plane crosses an edge, as the part of the way from `below` to `above`, and the place in (x, y).

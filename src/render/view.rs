@@ -1,9 +1,11 @@
 //! From fine units of a slab to the pixel grid of a surface.
 
+use std::ops::Range;
+
 use thiserror::Error;
 
 use super::complex::FINE_BITS;
-use super::scan::{GRID_BITS, GridPoint};
+use super::scan::{GRID_BITS, GridPoint, first_center};
 use crate::mesh::Domain;
 
 /// The part of the source picture to draw, in source pixels. It is stretched over the whole surface; what lies
@@ -46,7 +48,7 @@ impl Viewport {
 }
 
 /// The map from fine units to the grid of a surface, and the surface's size.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct View {
     scale: [f64; 2],
     offset: [f64; 2],
@@ -54,6 +56,15 @@ pub(super) struct View {
     pub(super) columns: i32,
     /// Height of the surface in pixels.
     pub(super) rows: i32,
+    /// Pixels whose centres show the source picture.
+    pub(super) picture: Pixels,
+}
+
+/// A rectangle of pixels.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Pixels {
+    pub(super) columns: Range<i32>,
+    pub(super) rows: Range<i32>,
 }
 
 impl View {
@@ -62,12 +73,21 @@ impl View {
         let fine = f64::from(domain.unit()) * f64::from(1 << FINE_BITS);
         let grid = f64::from(1 << GRID_BITS);
         let per_pixel = [f64::from(width) * grid / viewport.width, f64::from(height) * grid / viewport.height];
-        Self {
+        let mut view = Self {
             scale: per_pixel.map(|scale| scale / fine),
             offset: [viewport.x * per_pixel[0], viewport.y * per_pixel[1]],
             columns: width as i32,
             rows: height as i32,
-        }
+            picture: Pixels::default(),
+        };
+        let far = domain.extent().truncate().as_dvec2() * f64::from(1 << FINE_BITS);
+        let (first, end) = (view.grid(0.0, 0.0), view.grid(far.x, far.y));
+        let shown = |first: i64, end: i64, size: i32| {
+            let clamp = |v: i64| first_center(v).clamp(0, size.into()) as i32;
+            clamp(first)..clamp(end)
+        };
+        view.picture = Pixels { columns: shown(first.x, end.x, view.columns), rows: shown(first.y, end.y, view.rows) };
+        view
     }
 
     /// Where a point of the slice lies on the surface's grid.

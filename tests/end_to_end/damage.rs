@@ -27,7 +27,7 @@ fn play_on(decoder: &mut Decoder) -> Frame {
 /// Sends the packets of the first slab with one replaced. Pictures are drawn in between: whatever was decoded must be
 /// drawn without harm.
 fn play_damaged(packet: usize, data: &[u8]) -> Result<(), DecodeError> {
-    let mut decoder = Decoder::new(DecoderConfig { subdivision_levels: None, threads: 1 });
+    let mut decoder = Decoder::new(DecoderConfig { threads: 1, ..DecoderConfig::default() });
     let mut result = Ok(());
     for (k, good) in STREAM.packets[..SLAB].iter().enumerate() {
         let sent = decoder.send_packet(if k == packet { data } else { &good.data });

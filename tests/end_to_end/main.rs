@@ -96,7 +96,7 @@ fn settings_reach_the_stream() {
             let what = format!("{superpixels} superpixels, level {subdivision_levels}");
             assert!(psnr > 28.0, "{what}: {psnr:.1} dB");
             // Drawing at another level than the one fitted for works as well.
-            let other = DecoderConfig { subdivision_levels: Some(2 - subdivision_levels), threads: 0 };
+            let other = DecoderConfig { subdivision_levels: Some(2 - subdivision_levels), ..DecoderConfig::default() };
             decode(&stream.packets, SIZE, other);
         }
     }
@@ -126,7 +126,7 @@ fn threads_change_neither_bytes_nor_pixels() {
     assert!(one.bytes() == two.bytes(), "bytes with 1 and 2 threads");
     for levels in 0..=2 {
         let draw = |threads| {
-            let config = DecoderConfig { subdivision_levels: Some(levels), threads };
+            let config = DecoderConfig { subdivision_levels: Some(levels), threads, ..DecoderConfig::default() };
             decode(&one.packets, (197, 131), config)
         };
         assert!(draw(1) == draw(2), "pixels with 1 and 2 threads at level {levels}");

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use tetvec::mesh::{Domain, TetMesh, VertexId, Wedge, WedgeId};
 use tetvec::render::{
-    FINE_BITS, PixelSamples, Refined, Scene, Viewport, color_masks, cross_section, draw, sample, subdivide,
+    DrawParams, FINE_BITS, PixelSamples, Refined, Scene, Viewport, color_masks, cross_section, draw, sample, subdivide,
 };
 use tetvec::video::{PixelFormat, Plane, Surface, YuvMatrix};
 
@@ -11,14 +11,18 @@ use crate::meshes::{Lattice, Random};
 use crate::subdivision::zoo;
 
 /// An RGB picture of `mesh`.
-pub(crate) fn picture(
-    mesh: &TetMesh,
-    frame: f64,
-    levels: u8,
-    viewport: Option<Viewport>,
-    size: (u32, u32),
-) -> Vec<[u8; 3]> {
-    with_surface(size, |surface| draw(mesh, frame, levels, viewport, surface).expect("a viewport that can be drawn"))
+pub(crate) fn picture(mesh: &TetMesh, frame: f64, params: DrawParams, size: (u32, u32)) -> Vec<[u8; 3]> {
+    with_surface(size, |surface| draw(mesh, frame, &params, surface).expect("a viewport that can be drawn"))
+}
+
+/// The whole picture with anti-aliased boundaries.
+pub(crate) fn smooth(levels: u8) -> DrawParams {
+    DrawParams { levels, antialias: true, viewport: None }
+}
+
+/// The whole picture with each pixel as at its centre.
+pub(crate) fn stairs(levels: u8) -> DrawParams {
+    DrawParams { levels, antialias: false, viewport: None }
 }
 
 /// The RGB picture that `work` draws.
@@ -31,7 +35,7 @@ pub(crate) fn with_surface((width, height): (u32, u32), work: impl FnOnce(&mut S
 }
 
 /// `mesh` with every wedge in one colour.
-fn colored(mesh: &TetMesh, mut color: impl FnMut(Vec3, u32) -> Vec3) -> TetMesh {
+pub(crate) fn colored(mesh: &TetMesh, mut color: impl FnMut(Vec3, u32) -> Vec3) -> TetMesh {
     let unit = mesh.domain.unit() as f32;
     let mut mesh = mesh.clone();
     for wedge in &mut mesh.wedges {
@@ -50,7 +54,7 @@ fn no_hole_at_any_level_and_size() {
         for levels in 0..=2 {
             for size in [(1, 1), (7, 5), (23, 17), (61, 43), (101, 200)] {
                 for t in TIMES {
-                    let pixels = picture(&white, t, levels, None, size);
+                    let pixels = picture(&white, t, smooth(levels), size);
                     let holes = pixels.iter().filter(|p| **p != [255; 3]).count();
                     assert_eq!(holes, 0, "{name}, level {levels}, {size:?} at {t}");
                 }
@@ -129,7 +133,7 @@ fn count_fills(mesh: &TetMesh, t: f64, size: (u32, u32)) -> Vec<u32> {
             continue;
         }
         alone.positions = corners.to_vec();
-        for (count, pixel) in counts.iter_mut().zip(picture(&alone, t, 0, None, size)) {
+        for (count, pixel) in counts.iter_mut().zip(picture(&alone, t, stairs(0), size)) {
             *count += u32::from(pixel == [255; 3]);
         }
     }
@@ -142,7 +146,7 @@ fn constant_colour_is_exact_at_all_levels() {
     for (name, mesh) in zoo() {
         let flat = colored(&mesh, |_, _| color);
         for levels in 0..=2 {
-            let pixels = picture(&flat, 1.7, levels, None, (67, 51));
+            let pixels = picture(&flat, 1.7, smooth(levels), (67, 51));
             assert!(pixels.iter().all(|p| *p == [13, 200, 91]), "{name}, level {levels}");
         }
     }
@@ -157,7 +161,7 @@ fn linear_colour_is_reproduced_at_any_size() {
         for (size, t) in [((23u32, 17u32), 1.0f32), ((640, 360), 0.6), ((9, 301), 2.0)] {
             // The slab of one frame ends at t = 1.
             let t = t.min(mesh.domain.duration as f32);
-            let pixels = picture(&linear, f64::from(t), 0, None, size);
+            let pixels = picture(&linear, f64::from(t), smooth(0), size);
             for (i, pixel) in pixels.iter().enumerate() {
                 let (x, y) = (i as u32 % size.0, i as u32 / size.0);
                 let at = Vec3::new((x as f32 + 0.5) * w / size.0 as f32, (y as f32 + 0.5) * h / size.1 as f32, t);
@@ -180,7 +184,7 @@ fn pictures_agree_with_masks_and_samples() {
             let colors = color_masks(&mesh, levels).apply(&control);
             for t in [0.0, 1.0, 3.4] {
                 let samples = sample(&refined, &mesh.domain, t, 0..mesh.domain.height);
-                let pixels = picture(&mesh, t, levels, None, (mesh.domain.width, mesh.domain.height));
+                let pixels = picture(&mesh, t, stairs(levels), (mesh.domain.width, mesh.domain.height));
                 for (i, pixel) in pixels.iter().enumerate() {
                     let tet = refined.tets[samples.tet[i] as usize];
                     let weights = samples.weights[i];
@@ -248,9 +252,9 @@ fn labels_share_their_boundary() {
 fn zoom_equals_a_crop_of_a_larger_picture() {
     let mesh = Lattice::new([40, 30, 6], [7, 6, 3]).disc(2);
     for levels in 0..=2 {
-        let large = picture(&mesh, 1.5, levels, None, (400, 300));
-        let viewport = Viewport { x: 12.0, y: 7.0, width: 10.0, height: 8.0 };
-        let zoom = picture(&mesh, 1.5, levels, Some(viewport), (100, 80));
+        let large = picture(&mesh, 1.5, smooth(levels), (400, 300));
+        let viewport = Some(Viewport { x: 12.0, y: 7.0, width: 10.0, height: 8.0 });
+        let zoom = picture(&mesh, 1.5, DrawParams { viewport, ..smooth(levels) }, (100, 80));
         let mut off = 0;
         for y in 0..80 {
             for x in 0..100 {
@@ -267,13 +271,14 @@ fn far_zooms_and_strange_viewports_draw_or_refuse() {
     let mesh = colored(&Lattice::new([40, 30, 6], [7, 6, 3]).disc(2), |_, _| Vec3::splat(255.0));
     for (side, x) in [(0.001, 39.9), (0.5, 0.0), (1e6, 0.0), (0.001, 1000.0)] {
         let viewport = Viewport { x, y: 3.0, width: side, height: side };
-        let pixels = picture(&mesh, 1.0, 1, Some(viewport), (64, 48));
+        let pixels = picture(&mesh, 1.0, DrawParams { viewport: Some(viewport), ..smooth(1) }, (64, 48));
         assert_eq!(pixels[0] == [255; 3], x < 40.0 && side < 1e3, "{viewport:?}");
     }
     let mut scene = Scene::new(mesh.domain);
     for width in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-9] {
         let viewport = Viewport { x: 0.0, y: 0.0, width, height: 1.0 };
-        with_surface((4, 4), |surface| assert!(scene.draw(0.0, 0, Some(viewport), surface).is_err(), "{width}"));
+        let params = DrawParams { viewport: Some(viewport), ..smooth(0) };
+        with_surface((4, 4), |surface| assert!(scene.draw(0.0, &params, surface).is_err(), "{width}"));
     }
 }
 
@@ -282,7 +287,7 @@ fn nothing_is_black() {
     let mut scene = Scene::new(Lattice::new([40, 30, 6], [1, 1, 1]).domain);
     for t in [f64::NAN, f64::NEG_INFINITY, 0.0] {
         for levels in 0..=2 {
-            let pixels = with_surface((5, 4), |surface| scene.draw(t, levels, None, surface).unwrap());
+            let pixels = with_surface((5, 4), |surface| scene.draw(t, &smooth(levels), surface).unwrap());
             assert!(pixels.iter().all(|p| *p == [0; 3]));
         }
     }
@@ -301,12 +306,12 @@ fn growing_scenes_draw_the_same() {
             part.tets = mesh.tets[..end].to_vec();
             grown.extend(&part);
             for t in [1.0, 4.0, 11.0] {
-                with_surface((50, 40), |surface| grown.draw(t, levels, None, surface).unwrap());
+                with_surface((50, 40), |surface| grown.draw(t, &smooth(levels), surface).unwrap());
             }
         }
         for t in [0.0, 3.3, 6.0, 12.0] {
-            let found = with_surface((90, 70), |surface| grown.draw(t, levels, None, surface).unwrap());
-            assert_eq!(found, picture(&mesh, t, levels, None, (90, 70)), "level {levels} at {t}");
+            let found = with_surface((90, 70), |surface| grown.draw(t, &smooth(levels), surface).unwrap());
+            assert_eq!(found, picture(&mesh, t, smooth(levels), (90, 70)), "level {levels} at {t}");
         }
     }
 }
@@ -318,7 +323,7 @@ fn pixels_do_not_depend_on_threads() {
     for levels in 0..=2 {
         let draw = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool");
-            pool.install(|| picture(&mesh, 5.5, levels, None, (333, 222)))
+            pool.install(|| picture(&mesh, 5.5, smooth(levels), (333, 222)))
         };
         let one = draw(1);
         assert!([2, 3, 8].into_iter().all(|threads| draw(threads) == one), "level {levels}");
@@ -335,6 +340,6 @@ fn wild_colours_are_clamped() {
         Vec3::from_array([(); 3].map(|()| huge[random.range(0, 6) as usize]))
     });
     for levels in 0..=2 {
-        assert_eq!(picture(&mesh, 1.0, levels, None, (50, 40)).len(), 2000);
+        assert_eq!(picture(&mesh, 1.0, smooth(levels), (50, 40)).len(), 2000);
     }
 }

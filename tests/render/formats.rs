@@ -3,7 +3,7 @@
 use tetvec::render::draw;
 use tetvec::video::{Frame, PixelFormat, Plane, PlaneRef, Surface, YuvMatrix};
 
-use crate::drawing::picture;
+use crate::drawing::{picture, smooth};
 use crate::meshes::Lattice;
 
 const FORMATS: [PixelFormat; 5] =
@@ -25,7 +25,7 @@ fn drawn(format: PixelFormat, matrix: YuvMatrix, size: (u32, u32), extra: usize)
         sizes.iter().map(|&(row, rows)| (vec![PADDING; (row + extra) * rows - extra], row + extra)).collect();
     let views = planes.iter_mut().map(|(data, stride)| Plane { data, stride: *stride }).collect();
     let mut surface = Surface::try_new(format, matrix, size, views).expect("planes of the right size");
-    draw(&mesh, 2.5, 1, None, &mut surface).expect("the whole picture");
+    draw(&mesh, 2.5, &smooth(1), &mut surface).expect("the whole picture");
     let views: Vec<_> = planes.iter().map(|(data, stride)| PlaneRef { data, stride: *stride }).collect();
     let frame = Frame::try_from_planes(format, matrix, size, &views).expect("planes of the right size");
     Drawn { planes, frame }
@@ -35,7 +35,7 @@ fn drawn(format: PixelFormat, matrix: YuvMatrix, size: (u32, u32), extra: usize)
 fn rgb_formats_carry_the_same_picture() {
     let mesh = Lattice::new([40, 30, 6], [3, 3, 2]).plain(12);
     for size in [(1, 1), (41, 33), (64, 100)] {
-        let reference = picture(&mesh, 2.5, 1, None, size);
+        let reference = picture(&mesh, 2.5, smooth(1), size);
         for format in [PixelFormat::Rgb, PixelFormat::Rgbx, PixelFormat::Bgrx] {
             for extra in [0, 1, 13] {
                 assert_eq!(drawn(format, YuvMatrix::Bt601, size, extra).frame.pixels(), reference, "{format:?}");
@@ -48,7 +48,7 @@ fn rgb_formats_carry_the_same_picture() {
 fn yuv_formats_carry_the_same_picture() {
     let mesh = Lattice::new([40, 30, 6], [3, 3, 2]).plain(12);
     for size in [(320, 241), (401, 300), (255, 513)] {
-        let reference = picture(&mesh, 2.5, 1, None, size);
+        let reference = picture(&mesh, 2.5, smooth(1), size);
         for format in [PixelFormat::I420, PixelFormat::Nv12] {
             for matrix in [YuvMatrix::Bt601, YuvMatrix::Bt709] {
                 let frame = drawn(format, matrix, size, 3).frame;

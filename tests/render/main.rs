@@ -1,5 +1,6 @@
 //! Rendering from outside: subdivision, slicing, filling, formats.
 
+mod boundaries;
 mod drawing;
 mod formats;
 mod meshes;

@@ -24,12 +24,13 @@ const LEVELS_OF_STREAM: i32 = -1;
 #[derive(Debug, Clone, Copy)]
 struct Settings {
     subdivision_levels: i32,
+    antialias: bool,
     threads: u32,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { subdivision_levels: LEVELS_OF_STREAM, threads: 0 }
+        Self { subdivision_levels: LEVELS_OF_STREAM, antialias: true, threads: 0 }
     }
 }
 
@@ -37,6 +38,7 @@ impl Settings {
     fn decoder_config(self) -> DecoderConfig {
         DecoderConfig {
             subdivision_levels: u8::try_from(self.subdivision_levels).ok(),
+            antialias: self.antialias,
             threads: usize::try_from(self.threads).unwrap_or(0),
         }
     }
@@ -326,6 +328,12 @@ impl ObjectImpl for TetvecDec {
                     .default_value(default.subdivision_levels)
                     .mutable_ready()
                     .build(),
+                glib::ParamSpecBoolean::builder("antialias")
+                    .nick("Anti-aliasing")
+                    .blurb("Draw edges between labels smooth; without, they are stairs of pixels")
+                    .default_value(default.antialias)
+                    .mutable_ready()
+                    .build(),
                 glib::ParamSpecUInt::builder("threads")
                     .nick("Threads")
                     .blurb("Worker threads; pictures do not depend on it (0 = all cores)")
@@ -342,6 +350,7 @@ impl ObjectImpl for TetvecDec {
         let mut settings = self.lock_settings();
         match pspec.name() {
             "subdivision-levels" => settings.subdivision_levels = value.get().expect("checked by GObject"),
+            "antialias" => settings.antialias = value.get().expect("checked by GObject"),
             "threads" => settings.threads = value.get().expect("checked by GObject"),
             name => unreachable!("no property {name}"),
         }
@@ -351,6 +360,7 @@ impl ObjectImpl for TetvecDec {
         let settings = self.lock_settings();
         match pspec.name() {
             "subdivision-levels" => settings.subdivision_levels.to_value(),
+            "antialias" => settings.antialias.to_value(),
             "threads" => settings.threads.to_value(),
             name => unreachable!("no property {name}"),
         }

@@ -1,4 +1,4 @@
-//! Maps keyed by a face, for the two sides of the coding.
+//! Maps keyed by a face, for the coding and for drawing, which find a tet's neighbours as it comes.
 //!
 //! In: faces, as three vertices in whatever order the caller keeps to. Out: what was stored under them. Forbidden
 //! here: iteration, whose order is no one's business.
@@ -6,34 +6,34 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasher, Hasher, RandomState};
 
-use crate::mesh::VertexId;
+use super::VertexId;
 
-/// A map from faces to `T`. Lookups are the hot spot of the coding, and three small integers do not need SipHash: two
+/// A map from faces to `T`. Lookups are the hot spot of both, and three small integers do not need SipHash: two
 /// multiplications under keys drawn at random keep a hostile stream from choosing its collisions. Results never depend
 /// on the keys, since nothing can iterate.
 #[derive(Debug, Clone)]
-pub(super) struct FaceMap<T>(HashMap<[u64; 2], T, FoldState>);
+pub(crate) struct FaceMap<T>(HashMap<[u64; 2], T, FoldState>);
 
 fn key([a, b, c]: [VertexId; 3]) -> [u64; 2] {
     [u64::from(a.0) << 32 | u64::from(b.0), c.0.into()]
 }
 
 impl<T> FaceMap<T> {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let random = RandomState::new();
         Self(HashMap::with_hasher(FoldState([random.hash_one(0u8), random.hash_one(1u8) | 1])))
     }
 
-    pub(super) fn get(&self, face: [VertexId; 3]) -> Option<&T> {
+    pub(crate) fn get(&self, face: [VertexId; 3]) -> Option<&T> {
         self.0.get(&key(face))
     }
 
     /// Stores `value`, and returns what was there.
-    pub(super) fn insert(&mut self, face: [VertexId; 3], value: T) -> Option<T> {
+    pub(crate) fn insert(&mut self, face: [VertexId; 3], value: T) -> Option<T> {
         self.0.insert(key(face), value)
     }
 
-    pub(super) fn remove(&mut self, face: [VertexId; 3]) -> Option<T> {
+    pub(crate) fn remove(&mut self, face: [VertexId; 3]) -> Option<T> {
         self.0.remove(&key(face))
     }
 }
