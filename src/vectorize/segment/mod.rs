@@ -109,6 +109,8 @@ pub struct Segmenter {
     simple: SimplePoints,
     /// The last frame pushed, of whatever slab.
     view: Option<SceneView>,
+    /// What every frame's labels are, where there is a single one.
+    uniform: Option<LabelPlane>,
     /// The slab so far; none before its first frame.
     slab: Option<Slab>,
 }
@@ -143,6 +145,7 @@ impl Segmenter {
             tables: LabTables::new(),
             simple: SimplePoints::new(),
             view: None,
+            uniform: (params.superpixels == 1).then(|| LabelPlane::uniform(width.max(1), height.max(1), Label(0))),
             slab: None,
         }
     }
@@ -176,8 +179,8 @@ impl Segmenter {
     pub fn push(&mut self, frame: &Frame) -> LabelPlane {
         assert_eq!(Raster::new(frame.width(), frame.height()), self.raster, "frame size");
         self.view = Some(SceneView::new(frame));
-        if self.params.superpixels == 1 {
-            return LabelPlane::uniform(frame.width(), frame.height(), Label(0));
+        if let Some(uniform) = &self.uniform {
+            return uniform.clone();
         }
         let slab = match self.slab.take() {
             None => self.first(frame),
