@@ -108,6 +108,9 @@ impl<'a> Fitting<'a> {
     }
 
     fn surfaces(&mut self, labels: &[(u32, LabelPlane)]) {
+        if !self.patch.boundary.contains(&true) {
+            return;
+        }
         let boundary = BoundaryPoints::new(labels);
         let done = surface::optimize_surfaces(&mut self.patch, &self.model, &boundary, self.params);
         self.report.distance_before = done.distance_before;
@@ -172,7 +175,7 @@ impl<'a> Fitting<'a> {
 
     fn measure(&self) -> Vec<Moments> {
         let points = self.model.points(&self.patch.mesh.positions);
-        measure(&self.model, &points, &self.model.node_colors(&self.colors.now), self.frames)
+        measure(&self.model, &points, &self.model.node_colors(&self.colors.now), self.frames, Vec::new())
     }
 
     fn rms(&self, moments: &[Moments]) -> f64 {
