@@ -55,7 +55,10 @@ pub struct WorkMesh<Q> {
     pub(super) overflow: Vec<WorkWedge<Q>>,
     pub(super) tets: Vec<[u32; 4]>,
     pub(super) labels: Vec<Label>,
+    /// Tets around each vertex, while edges collapse.
     pub(super) stars: Stars,
+    /// Positions of the vertices once more, while edges collapse: checks wait for nothing else.
+    pub(super) places: Vec<IVec3>,
 }
 
 impl<Q: WedgeQuadric> WorkMesh<Q> {
@@ -70,6 +73,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
             tets: Vec::new(),
             labels: Vec::new(),
             stars: Stars::default(),
+            places: Vec::new(),
         }
     }
 
@@ -102,9 +106,10 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         };
         let first_vertex = self.vertices.len();
         let vertices: Vec<u32> = run.positions.iter().map(|position| place(self, position)).collect();
-        self.add_tets(run, &vertices);
+        for tet in 0..run.tets.len() {
+            self.add_tet(run, tet, run.tet_vertices(tet).map(|v| vertices[v.index()]));
+        }
         self.spread(first_vertex, params.spread_weight);
-        self.stars = Stars::new(self.vertices.len(), &self.tets);
         self.add_surfaces(self.tets.len() - run.tets.len(), |_| true, params.surface_weight);
     }
 
@@ -127,13 +132,19 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         self.vertices.len() as u32 - 1
     }
 
-    /// Adds the tets of `run`, whose vertices are `vertices` here, with their colours' quadrics.
-    pub(super) fn add_tets(&mut self, run: &TetMesh, vertices: &[u32]) {
-        for (tet, corners) in run.tets.iter().enumerate() {
-            self.tets.push(corners.map(|w| vertices[run.vertex(w).index()]));
-            self.labels.push(run.tet_label(tet));
+    /// Adds a tet of `run`, whose corners are `corners` here, with its colours' quadrics.
+    pub(super) fn add_tet(&mut self, run: &TetMesh, tet: usize, corners: [u32; 4]) {
+        let label = run.tet_label(tet);
+        self.tets.push(corners);
+        self.labels.push(label);
+        let unit = self.domain.unit() as f32;
+        let positions = run.tet_positions(tet).map(|p| p.as_vec3() / unit);
+        let colors = run.tets[tet].map(|w| run.wedges[w.index()].color);
+        let (gradient, volume) = linear_field(positions, colors);
+        for (vertex, color) in corners.into_iter().zip(colors) {
+            let field = TetField { gradient, color, weight: 0.25 * volume };
+            self.wedge_mut(vertex, label).quadric.add(&Q::of_tet(&field));
         }
-        self.add_color_quadrics(run, vertices);
     }
 
     /// Gives the vertices from `first` on, other than frozen ones, their part in the uniformity term.
@@ -188,23 +199,13 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         (to - from).as_vec3() / self.domain.unit() as f32
     }
 
-    fn add_color_quadrics(&mut self, run: &TetMesh, vertices: &[u32]) {
-        let unit = self.domain.unit() as f32;
-        for (tet, corners) in run.tets.iter().enumerate() {
-            let positions = run.tet_positions(tet).map(|p| p.as_vec3() / unit);
-            let colors = corners.map(|w| run.wedges[w.index()].color);
-            let (gradient, volume) = linear_field(positions, colors);
-            for (corner, wedge) in corners.iter().enumerate() {
-                let field = TetField { gradient, color: colors[corner], weight: 0.25 * volume };
-                let vertex = vertices[run.vertex(*wedge).index()];
-                self.wedge_mut(vertex, run.tet_label(tet)).quadric.add(&Q::of_tet(&field));
-            }
-        }
-    }
-
     /// Adds the planes of the faces between labels that `is_wanted`, found among tets from `first_tet` on, to their
     /// vertices. `weight`: squared levels a squared pixel of distance, a square pixel of surface.
     pub(super) fn add_surfaces(&mut self, first_tet: usize, is_wanted: impl Fn([bool; 3]) -> bool, weight: f32) {
+        if self.overflow.is_empty() {
+            return;
+        }
+        let stars = Stars::new(self.vertices.len(), &self.tets);
         let is_inside = |mesh: &Self, v: u32| mesh.vertices[v as usize].first.next == NONE;
         for tet in first_tet..self.tets.len() {
             let corners = self.tets[tet];
@@ -218,7 +219,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
                     continue;
                 }
                 // Each face between labels once: from its side of the greater label, which may be an older tet.
-                let across = self.across(tet, face);
+                let across = self.across(&stars, tet, face);
                 let between = across.is_some_and(|other| {
                     self.labels[other] != self.labels[tet]
                         && (other < first_tet || self.labels[other] < self.labels[tet])
@@ -231,8 +232,8 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     }
 
     /// The tet on the other side of a face of `tet`.
-    fn across(&self, tet: usize, face: [u32; 3]) -> Option<usize> {
-        let star = self.stars.star(face[0]).iter().map(|&t| t as usize);
+    fn across(&self, stars: &Stars, tet: usize, face: [u32; 3]) -> Option<usize> {
+        let star = stars.star(face[0]).iter().map(|&t| t as usize);
         star.filter(|&t| t != tet).find(|&t| face.iter().all(|v| self.tets[t].contains(v)))
     }
 
