@@ -1,6 +1,6 @@
 //! One clip through encoder and decoder, in figures: `measure frame*.png --preset fast`, or `measure in.y4m`.
 //!
-//! Prints one line: wall clock a frame, in all and by stage, peak memory, simplification ratio, bytes, error against the
+//! Prints one line: wall clock a frame, in all and by stage, collapses a second of the simplification, peak memory, simplification ratio, bytes, error against the
 //! source, and how long decoding and drawing at the source's size take. `scripts/bench.sh` compares settings with it.
 
 #[path = "vectorize/settings.rs"]
@@ -64,6 +64,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         let time = encoded.stages.get(&stage).copied().unwrap_or_default();
         print!(" {} {:.3}", stage.name(), time.as_secs_f64() / count);
     }
+    let simplified = encoded.stages.get(&Stage::Simplify).map_or(1.0, Duration::as_secs_f64);
+    let (collapses, evaluations) = encoded.collapses;
+    print!(" | {:.0} k collapses/s", collapses as f64 / simplified / 1e3);
+    print!(" of {:.1} evaluations", evaluations as f64 / collapses.max(1) as f64);
     if let (Some(before), Some(memory)) = (before, memory) {
         print!(" | {:.0} MB, {:.0} MB without the source", memory, memory - before);
     }
@@ -80,21 +84,29 @@ struct Encoded {
     vertices: u64,
     time: Duration,
     stages: HashMap<Stage, Duration>,
+    /// Edges collapsed, and costs computed for that.
+    collapses: (u64, u64),
 }
 
 fn encode(frames: &[Frame], config: EncoderConfig) -> Result<Encoded, Box<dyn Error>> {
     let mut encoder = Encoder::try_new(config)?;
-    let stages = Arc::new(Mutex::new(HashMap::new()));
+    let figures = Arc::new(Mutex::new((HashMap::new(), (0, 0))));
     let mut began = None;
-    let noted = stages.clone();
+    let noted = figures.clone();
     encoder.observe(move |event| match event {
         Event::Began(stage) => began = Some((stage, Instant::now())),
         Event::Ended => {
-            if let (Some((stage, start)), Ok(mut stages)) = (began.take(), noted.lock()) {
-                *stages.entry(stage).or_default() += start.elapsed();
+            if let (Some((stage, start)), Ok(mut figures)) = (began.take(), noted.lock()) {
+                *figures.0.entry(stage).or_default() += start.elapsed();
             }
         }
-        Event::Simplified(_) | Event::Fitted(_) => {}
+        Event::Simplified(report) => {
+            if let Ok(mut figures) = noted.lock() {
+                let (collapses, evaluations) = figures.1;
+                figures.1 = (collapses + report.collapses, evaluations + report.evaluations);
+            }
+        }
+        Event::Fitted(_) => {}
     });
     let mut packets = Vec::new();
     let start = Instant::now();
@@ -105,8 +117,8 @@ fn encode(frames: &[Frame], config: EncoderConfig) -> Result<Encoded, Box<dyn Er
     encoder.finish()?;
     packets.extend(std::iter::from_fn(|| encoder.receive_packet()));
     let time = start.elapsed();
-    let stages = stages.lock().map_err(|error| error.to_string())?.clone();
-    Ok(Encoded { packets, vertices: encoder.vertices(), time, stages })
+    let (stages, collapses) = figures.lock().map_err(|error| error.to_string())?.clone();
+    Ok(Encoded { packets, vertices: encoder.vertices(), time, stages, collapses })
 }
 
 fn decode(frames: &[Frame], packets: &[Packet]) -> Result<(Difference, Duration), Box<dyn Error>> {

@@ -221,7 +221,7 @@ fn blocks_join_into_one_tiling() {
     let params = SimplifyParams { block_vertices: 1500, ..SimplifyParams::default() };
     let simplified = || {
         let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
-        let goal = BlockGoal { keep: 0.5, max_error: f32::INFINITY };
+        let goal = BlockGoal { keep: 0.5, max_error: f32::INFINITY, shift: 0.0 };
         let mut collapses = 0;
         for (first, last) in [(0, 4), (4, 7), (7, 10)] {
             let run = clip.run(first, last);
@@ -254,7 +254,7 @@ fn blocks_leave_frozen_vertices() {
     let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
     work.append(&clip.whole(), &params);
     let unfrozen = Unfrozen { low: 2 * 8, high: 6 * 8 };
-    work.simplify_blocks(unfrozen, BlockGoal { keep: 0.1, max_error: f32::INFINITY }, &params);
+    work.simplify_blocks(unfrozen, BlockGoal { keep: 0.1, max_error: f32::INFINITY, shift: 0.5 }, &params);
     let mut mesh = TetMesh::empty(clip.domain);
     work.commit(i32::MAX, &mut mesh);
     assert_eq!(validate(&mesh), Ok(()));

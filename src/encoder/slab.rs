@@ -21,8 +21,15 @@ const TRANSITION_RATIO: f64 = 0.1;
 /// the window, where they compete with all others.
 const RUN_RATIO: f64 = 2.0;
 
-/// The same for blocks of the window.
-const WINDOW_RATIO: f64 = 1.25;
+/// The same for blocks of the window, pass by pass, each along other lines ([`BlockGoal::shift`]): what is left to the last
+/// pass over the whole runs on one core.
+const WINDOW_PASSES: [BlockPass; 2] = [BlockPass { shift: 0.5, ratio: 1.5 }, BlockPass { shift: 0.0, ratio: 1.1 }];
+
+/// A pass over the window in blocks.
+struct BlockPass {
+    shift: f64,
+    ratio: f64,
+}
 
 /// The part of the error allowed that blocks of a run may make, where the error decides.
 const RUN_ERROR: f32 = 0.25;
@@ -175,17 +182,17 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     fn goal_of_run(&self, run: &TetMesh, frames: u32) -> BlockGoal {
         let pixels = self.pixels() * f64::from(frames);
         if self.is_steered() {
-            return BlockGoal { keep: 0.0, max_error: RUN_ERROR * self.allowed_error(pixels) };
+            return BlockGoal { keep: 0.0, max_error: RUN_ERROR * self.allowed_error(pixels), shift: 0.0 };
         }
         let keep = RUN_RATIO * self.ratio * pixels / run.positions.len() as f64;
-        BlockGoal { keep: keep.min(1.0), max_error: f32::INFINITY }
+        BlockGoal { keep: keep.min(1.0), max_error: f32::INFINITY, shift: 0.0 }
     }
 
     /// How far the blocks of the window are simplified at the slab's end, where that is worth the trouble.
-    fn goal_of_blocks(&self, goal: &Goal) -> Option<BlockGoal> {
-        let keep = WINDOW_RATIO * goal.vertices as f64 / self.work.vertex_count() as f64;
+    fn goal_of_blocks(&self, goal: &Goal, pass: &BlockPass) -> Option<BlockGoal> {
+        let keep = pass.ratio * goal.vertices as f64 / self.work.vertex_count() as f64;
         let is_whole = goal.before == i32::MAX && self.frozen < 0 && !self.is_steered();
-        (is_whole && keep < 1.0).then_some(BlockGoal { keep, max_error: f32::INFINITY })
+        (is_whole && keep < 1.0).then_some(BlockGoal { keep, max_error: f32::INFINITY, shift: pass.shift })
     }
 
     /// Whether the error decides, not the ratio.
@@ -211,10 +218,12 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let goal = self.goal(frames, lead);
         let unfrozen = Unfrozen { low: self.frozen, high };
         observer.tell(Event::Began(Stage::Simplify));
-        if let Some(goal) = self.goal_of_blocks(&goal) {
-            let report = self.work.simplify_blocks(unfrozen, goal, &self.simplify_params);
-            log::debug!("blocks of the window: {report:?}");
-            observer.tell(Event::Simplified(report));
+        for pass in &WINDOW_PASSES {
+            if let Some(goal) = self.goal_of_blocks(&goal, pass) {
+                let report = self.work.simplify_blocks(unfrozen, goal, &self.simplify_params);
+                log::debug!("blocks of the window: {report:?}");
+                observer.tell(Event::Simplified(report));
+            }
         }
         let report = simplify(&mut self.work, unfrozen, goal, &self.simplify_params);
         log::debug!("simplify: {report:?}, {goal:?}");
@@ -225,7 +234,10 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             // What the goal counted.
             None => self.frozen.max(goal.before - 1),
         };
-        self.work.commit(self.frozen, &mut self.committed);
+        // A window that only grows neither collapses nor hands on anything.
+        if report.collapses > 0 || self.frozen >= 0 {
+            self.work.commit(self.frozen, &mut self.committed);
+        }
         self.send_ready(frames, observer)
     }
 

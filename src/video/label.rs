@@ -1,22 +1,24 @@
 //! Labels: which region (temporal superpixel, or a merger of several) a pixel or a tet belongs to.
 
+use std::sync::Arc;
+
 /// A region of the video that persists through time within a slab. Colour may jump only between labels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Label(pub u32);
 
-/// A label for every pixel of one frame, row-major.
+/// A label for every pixel of one frame, row-major. Clones share their labels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LabelPlane {
     width: u32,
     height: u32,
-    labels: Vec<Label>,
+    labels: Arc<[Label]>,
 }
 
 impl LabelPlane {
     /// Wraps `labels`, row-major; panics unless there are `width * height` of them.
     pub fn new(width: u32, height: u32, labels: Vec<Label>) -> Self {
         assert_eq!(labels.len(), width as usize * height as usize, "one label a pixel");
-        Self { width, height, labels }
+        Self { width, height, labels: labels.into() }
     }
 
     /// A plane of one label.

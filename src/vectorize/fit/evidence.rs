@@ -6,7 +6,7 @@ use super::edges::EdgePixels;
 use super::interface::find_crossings;
 use super::marks::Marks;
 use super::model::Model;
-use super::moments::{Moments, View, measure};
+use super::moments::{Moments, View, find_pieces, measure};
 use super::parallel;
 use super::planes::Planes;
 use crate::video::Volume;
@@ -21,12 +21,15 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// Looks at the frames. `points` are the model's points, `colors` its nodes' colours (only to choose references by).
-    pub(super) fn gather(model: &Model, points: &[IVec3], colors: &[Vec3], frames: &Volume) -> Self {
+    /// Looks at the frames, in the memory of what was seen before. `points` are the model's points, `colors` its nodes'
+    /// colours (only to choose references by).
+    pub(super) fn gather(self, model: &Model, points: &[IVec3], colors: &[Vec3], frames: &Volume) -> Self {
         let planes = Planes::new(model, frames);
         let crossings = find_crossings(&model.interfaces, points, &planes);
         let marks = Marks::new(&crossings, model.domain.width, model.domain.height);
-        let (moments, pieces) = measure(model, points, colors, &View { planes, marks: &marks });
+        let view = View { planes, marks: &marks };
+        let moments = measure(model, points, colors, &view, self.moments);
+        let pieces = find_pieces(model, points, &view);
         Self { moments, edges: EdgePixels::new(&marks, frames, pieces, &crossings) }
     }
 

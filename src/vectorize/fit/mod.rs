@@ -114,6 +114,9 @@ impl<'a> Fitting<'a> {
     }
 
     fn surfaces(&mut self, labels: &[(u32, LabelPlane)]) {
+        if !self.patch.boundary.contains(&true) {
+            return;
+        }
         let boundary = BoundaryPoints::new(labels);
         let done = surface::optimize_surfaces(&mut self.patch, &self.model, &boundary, self.params);
         self.report.distance_before = done.distance_before;
@@ -178,7 +181,7 @@ impl<'a> Fitting<'a> {
 
     fn gather(&self) -> Evidence {
         let points = self.model.points(&self.patch.mesh.positions);
-        Evidence::gather(&self.model, &points, &self.model.node_colors(&self.colors.now), self.frames)
+        Evidence::default().gather(&self.model, &points, &self.model.node_colors(&self.colors.now), self.frames)
     }
 
     fn rms(&self, evidence: &Evidence) -> f64 {

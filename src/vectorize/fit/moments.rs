@@ -16,11 +16,11 @@ use super::polygon::{FLAT, Polygon, Weights};
 
 /// Sums over the pixels of one fine tet. phi are the weights (barycentric coordinates) of a pixel's centre, and
 /// colours are taken relative to `reference`, so that sums of squares stay exact enough in f32.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Moments {
     /// Number of the tet among the model's tets.
     pub(super) tet: u32,
-    /// Number of pixels.
+    /// Number of pixels; 0 where all sums are.
     pub(super) pixels: u32,
     /// The colour that sums are relative to.
     reference: Vec3,
@@ -65,7 +65,7 @@ impl Moments {
     }
 }
 
-/// Fine tets that one worker takes at a time.
+/// Fewest fine tets that one worker takes at a time.
 const TETS_PER_TASK: usize = 512;
 
 /// What tets are looked at with.
@@ -75,29 +75,40 @@ pub(super) struct View<'a> {
     pub(super) marks: &'a Marks,
 }
 
-/// The moments of all of the model's tets that cover a pixel that is not marked, in the order of the tets; and of the
-/// marked pixels the parts that tets cover, each with the pixel's number. `points` are the model's points (its fine
-/// units), `colors` the nodes' colours (only to choose references by).
+/// The moments of all of the model's tets, in their order, over the pixels that are not marked. `points` are the model's
+/// points (its fine units), `colors` the nodes' colours (only to choose references by). They are written into the memory
+/// of `buffer`: it is most of what a fit holds, and the time to be given it anew was a tenth of a fit.
 pub(super) fn measure(
     model: &Model,
     points: &[IVec3],
     colors: &[Vec3],
     view: &View<'_>,
-) -> (Vec<Moments>, Vec<(u32, Piece)>) {
+    mut buffer: Vec<Moments>,
+) -> Vec<Moments> {
+    buffer.resize(model.tets.len(), Moments::default());
+    parallel::fill_by(TETS_PER_TASK, &mut buffer, |tet| {
+        let nodes = model.tets[tet].map(|n| n as usize);
+        let corners = nodes.map(|n| points[model.node_point[n] as usize]);
+        let reference = nodes.iter().map(|&n| colors[n]).sum::<Vec3>() * 0.25;
+        let empty = Moments { tet: tet as u32, ..Moments::default() };
+        view.moments(tet as u32, corners, reference).unwrap_or(empty)
+    });
+    buffer
+}
+
+/// The parts of marked pixels that tets cover, each with the pixel's number, in the order of the tets.
+pub(super) fn find_pieces(model: &Model, points: &[IVec3], view: &View<'_>) -> Vec<(u32, Piece)> {
+    if view.marks.count() == 0 {
+        return Vec::new();
+    }
     let task = |task: usize| {
-        let range = task * TETS_PER_TASK..((task + 1) * TETS_PER_TASK).min(model.tets.len());
-        let (mut found, mut pieces) = (Vec::new(), Vec::new());
-        for tet in range {
-            let nodes = model.tets[tet].map(|n| n as usize);
-            let corners = nodes.map(|n| points[model.node_point[n] as usize]);
-            let reference = nodes.iter().map(|&n| colors[n]).sum::<Vec3>() * 0.25;
-            found.extend(observe_tet(view, tet as u32, corners, reference, &mut pieces));
+        let mut pieces = Vec::new();
+        for tet in task * TETS_PER_TASK..((task + 1) * TETS_PER_TASK).min(model.tets.len()) {
+            view.pieces(tet as u32, model.tet_points(tet).map(|p| points[p]), &mut pieces);
         }
-        (found, pieces)
+        pieces
     };
-    let parts = parallel::map(model.tets.len().div_ceil(TETS_PER_TASK), task);
-    let (moments, pieces): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
-    (moments.concat(), pieces.concat())
+    parallel::map(model.tets.len().div_ceil(TETS_PER_TASK), task).concat()
 }
 
 /// The gradient of colour inside a tet with corners `p` (fine units) and corner colours `c`: maps a displacement in
@@ -114,51 +125,57 @@ pub(super) fn color_gradient(p: [IVec3; 4], c: [Vec3; 4], fine_unit: f32) -> Mat
     Mat3::from_cols(column(0), column(1), column(2))
 }
 
-/// The moments of one tet, and the parts of edge pixels that it covers.
-fn observe_tet(
-    view: &View<'_>,
-    tet: u32,
-    corners: [IVec3; 4],
-    reference: Vec3,
-    pieces: &mut Vec<(u32, Piece)>,
-) -> Option<Moments> {
-    let planes = &view.planes;
-    let p = corners.map(|c| planes.to_px(c));
-    let range = planes.range(&p);
-    if range.is_empty() {
-        return None;
-    }
-    let weights = Weights::new(p)?;
-    let mut sums = Sums::default();
-    for k in range {
-        let Some(frame) = planes.frames.frame(k) else { continue };
-        let plane = planes.time(k);
-        let polygon = Polygon::slice(p, plane);
-        let mut add = |y: u32, from: u32, to: u32| {
-            let start = weights.at(DVec3::new(f64::from(from) + 0.5, f64::from(y) + 0.5, plane));
-            sums.add(&frame.row(y)[from as usize..to as usize], start, reference, weights.along_x);
-        };
-        let Some(marks) = view.marks.frame(k) else {
-            polygon.spans(frame.width(), frame.height(), add);
-            continue;
-        };
-        polygon.spans(frame.width(), frame.height(), |y, from, to| {
-            marks.unmarked(y, from..to, |run| add(y, run.start, run.end))
-        });
-        for y in polygon.rows(frame.height()) {
-            if !marks.any_in_row(y) {
-                continue;
+impl View<'_> {
+    /// The moments of one tet; none if it covers no pixel.
+    fn moments(&self, tet: u32, corners: [IVec3; 4], reference: Vec3) -> Option<Moments> {
+        let p = corners.map(|c| self.planes.to_px(c));
+        let range = self.planes.range(&p);
+        if range.is_empty() {
+            return None;
+        }
+        let weights = Weights::new(p)?;
+        let mut sums = Sums::default();
+        for k in range {
+            let Some(frame) = self.planes.frames.frame(k) else { continue };
+            let plane = self.planes.time(k);
+            let polygon = Polygon::slice(p, plane);
+            let mut add = |y: u32, from: u32, to: u32| {
+                let start = weights.at(DVec3::new(f64::from(from) + 0.5, f64::from(y) + 0.5, plane));
+                sums.add(&frame.row(y)[from as usize..to as usize], start, reference, weights.along_x);
+            };
+            match self.marks.frame(k) {
+                None => polygon.spans(frame.width(), frame.height(), add),
+                Some(marks) => polygon.spans(frame.width(), frame.height(), |y, from, to| {
+                    marks.unmarked(y, from..to, |run| add(y, run.start, run.end));
+                }),
             }
-            let strip = polygon.strip(y);
-            marks.marked(y, strip.columns(frame.width()), |x, row| {
-                if let Some((area, centre)) = strip.in_column(x) {
-                    let share = weights.at(centre.extend(plane)) * area as f32;
-                    pieces.push((row, Piece { tet, share }));
-                }
-            });
+        }
+        sums.finish(tet, reference)
+    }
+
+    /// Appends the parts of marked pixels that one tet covers.
+    fn pieces(&self, tet: u32, corners: [IVec3; 4], pieces: &mut Vec<(u32, Piece)>) {
+        let p = corners.map(|c| self.planes.to_px(c));
+        let range = self.planes.range(&p);
+        if range.is_empty() {
+            return;
+        }
+        let Some(weights) = Weights::new(p) else { return };
+        for k in range {
+            let (Some(frame), Some(marks)) = (self.planes.frames.frame(k), self.marks.frame(k)) else { continue };
+            let plane = self.planes.time(k);
+            let polygon = Polygon::slice(p, plane);
+            for y in polygon.rows(frame.height()).filter(|&y| marks.any_in_row(y)) {
+                let strip = polygon.strip(y);
+                marks.marked(y, strip.columns(frame.width()), |x, row| {
+                    if let Some((area, centre)) = strip.in_column(x) {
+                        let share = weights.at(centre.extend(plane)) * area as f32;
+                        pieces.push((row, Piece { tet, share }));
+                    }
+                });
+            }
         }
     }
-    sums.finish(tet, reference)
 }
 
 /// The sums while they grow, four corners to a vector.

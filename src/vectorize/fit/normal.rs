@@ -143,7 +143,7 @@ impl<'a> NormalEquations<'a> {
         if points > 0 {
             out.extend(model.positions_back.times(&sums[nodes..]));
         }
-        out.iter_mut().zip(&self.mask).for_each(|(out, mask)| *out *= *mask);
+        parallel::update(&mut out, |i, out| *out *= self.mask[i]);
         out
     }
 
@@ -244,14 +244,17 @@ impl System for NormalEquations<'_> {
                 change
             },
         );
-        out.iter_mut().zip(x).zip(&self.damping).for_each(|((out, x), d)| *out += *x * *d);
+        parallel::update(&mut out, |i, out| *out += x[i] * self.damping[i]);
         out
     }
 
     fn precondition(&self, r: &[Vec3]) -> Vec<Vec3> {
-        let (colors, positions) = r.split_at(self.wedges());
-        let mut out: Vec<Vec3> = colors.iter().zip(&self.color_inverse).map(|(r, d)| *r * *d).collect();
-        out.extend(positions.iter().zip(&self.position_inverse).map(|(r, inverse)| *inverse * *r));
+        let wedges = self.wedges();
+        let mut out = vec![Vec3::ZERO; r.len()];
+        parallel::fill(&mut out, |i| match self.color_inverse.get(i) {
+            Some(inverse) => r[i] * *inverse,
+            None => self.position_inverse[i - wedges] * r[i],
+        });
         out
     }
 }

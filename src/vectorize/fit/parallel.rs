@@ -23,15 +23,28 @@ pub(super) fn map<T: Send>(count: usize, f: impl Fn(usize) -> T + Sync + Send) -
 
 /// Overwrites `values[i]` with `f(i)`.
 pub(super) fn fill<T: Send>(values: &mut [T], f: impl Fn(usize) -> T + Sync + Send) {
-    #[cfg(feature = "threads")]
-    {
-        use rayon::prelude::*;
-        values.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(i, value)| *value = f(i));
-    }
-    #[cfg(not(feature = "threads"))]
-    {
-        values.iter_mut().enumerate().for_each(|(i, value)| *value = f(i));
-    }
+    update(values, |i, value| *value = f(i));
+}
+
+/// Changes every value by `f(i, value)`.
+pub(super) fn update<T: Send>(values: &mut [T], f: impl Fn(usize, &mut T) + Sync + Send) {
+    update_by(CHUNK, values, f);
+}
+
+/// Overwrites `values[i]` with `f(i)`, at least `least` of them at a time.
+pub(super) fn fill_by<T: Send>(least: usize, values: &mut [T], f: impl Fn(usize) -> T + Sync + Send) {
+    update_by(least, values, |i, value| *value = f(i));
+}
+
+#[cfg(feature = "threads")]
+fn update_by<T: Send>(least: usize, values: &mut [T], f: impl Fn(usize, &mut T) + Sync + Send) {
+    use rayon::prelude::*;
+    values.par_iter_mut().with_min_len(least).enumerate().for_each(|(i, value)| f(i, value));
+}
+
+#[cfg(not(feature = "threads"))]
+fn update_by<T>(_least: usize, values: &mut [T], f: impl Fn(usize, &mut T)) {
+    values.iter_mut().enumerate().for_each(|(i, value)| f(i, value));
 }
 
 /// The sum of `f(i)` over `0..count`, chunk by chunk.

@@ -48,10 +48,10 @@ pub(super) fn optimize_positions(
         let wish = state.step(patch, model, params, damping);
         let before = patch.mesh.positions.clone();
         report.refused += guard.move_all(&mut patch.mesh, &wish.steps);
-        let mut tried = State { colors: state.colors.clone(), evidence: Evidence::default(), error: 0.0 };
-        tried.colors.add(&wish.colors);
         // The moments are most of a fit's memory: one set at a time. Steps that fail are few.
-        state.evidence = Evidence::default();
+        let evidence = std::mem::take(&mut state.evidence);
+        let mut tried = State { colors: state.colors.clone(), evidence, error: 0.0 };
+        tried.colors.add(&wish.colors);
         tried.look(patch, model, frames, params);
         if tried.error < state.error {
             let gain = (state.error - tried.error) / state.error;
@@ -63,6 +63,7 @@ pub(super) fn optimize_positions(
             }
         } else {
             patch.mesh.positions = before;
+            state.evidence = tried.evidence;
             state.measure(patch, model, frames);
             damping *= DAMPING_BAD;
             if damping > DAMPING_RANGE[1] {
@@ -105,7 +106,8 @@ impl State {
 
     fn measure(&mut self, patch: &Patch, model: &Model, frames: &Volume) {
         let points = model.points(&patch.mesh.positions);
-        self.evidence = Evidence::gather(model, &points, &model.node_colors(&self.colors.now), frames);
+        let evidence = std::mem::take(&mut self.evidence);
+        self.evidence = evidence.gather(model, &points, &model.node_colors(&self.colors.now), frames);
     }
 
     fn step(&self, patch: &Patch, model: &Model, params: &FitParams, damping: f32) -> Wish {

@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 
-use super::parallel::{dot, fill};
+use super::parallel::{dot, fill, update};
 
 /// A sparse matrix in compressed rows; it maps a vector of triples (colours, positions) component by component.
 #[derive(Debug, Clone, Default)]
@@ -93,12 +93,12 @@ pub(super) fn conjugate_gradient(system: &impl System, rhs: Vec<Vec3>, iteration
             break;
         }
         let step = (rho / curvature) as f32;
-        x.iter_mut().zip(&direction).for_each(|(x, d)| *x += *d * step);
-        residual.iter_mut().zip(&product).for_each(|(r, p)| *r -= *p * step);
+        update(&mut x, |i, x| *x += direction[i] * step);
+        update(&mut residual, |i, r| *r -= product[i] * step);
         z = system.precondition(&residual);
         let next = dot(&residual, &z);
         let keep = (next / rho) as f32;
-        direction.iter_mut().zip(&z).for_each(|(d, z)| *d = *z + *d * keep);
+        update(&mut direction, |i, d| *d = z[i] + *d * keep);
         rho = next;
     }
     x

@@ -64,6 +64,8 @@ pub struct Segmenter {
     params: SegmentParams,
     /// The last frame pushed, of whatever slab.
     view: Option<SceneView>,
+    /// What every frame's labels are, where there is a single one.
+    uniform: LabelPlane,
     /// Where a number of superpixels is asked for.
     temporal: TemporalSuperpixels,
     /// Where labels are chosen by content.
@@ -78,6 +80,7 @@ impl Segmenter {
             raster,
             params,
             view: None,
+            uniform: LabelPlane::uniform(width.max(1), height.max(1), Label(0)),
             temporal: TemporalSuperpixels::new(raster, params.superpixels, params.min_area_px),
             content: Content::new(raster, params),
         }
@@ -115,7 +118,7 @@ impl Segmenter {
         self.view = Some(SceneView::new(frame));
         match self.params.superpixels {
             0 => self.content.push(frame),
-            1 => LabelPlane::uniform(frame.width(), frame.height(), Label(0)),
+            1 => self.uniform.clone(),
             _ => self.temporal.push(frame),
         }
     }

@@ -11,11 +11,10 @@ use glam::IVec3;
 use super::SimplifyParams;
 use super::collapse::{Goal, SimplifyReport, Unfrozen, simplify};
 use super::quadric::{PositionQuadric, WedgeQuadric};
-use super::stars::Stars;
 use super::surfaces::surface_quadrics;
 use super::work_mesh::{NONE, WorkMesh};
-use crate::mesh::{Domain, Sides, TetMesh, Wedge};
-use crate::vectorize::parallel::map;
+use crate::mesh::{Domain, Sides, TetMesh};
+use crate::vectorize::parallel::{for_each, map};
 
 /// A vertex of more than one block.
 const SHARED: u32 = u32::MAX - 1;
@@ -27,15 +26,9 @@ pub struct BlockGoal {
     pub keep: f64,
     /// As [`Goal::max_error`], over the whole run.
     pub max_error: f32,
-}
-
-/// A block's part of a run.
-struct Block {
-    mesh: TetMesh,
-    /// Which of its vertices are to stay.
-    frozen: Vec<bool>,
-    /// What its vertices' label surfaces cost, but for frozen ones.
-    surfaces: Vec<Option<PositionQuadric>>,
+    /// By which part of a band, less than 1, the lines between bands are moved: what one pass leaves frozen another
+    /// reaches.
+    pub shift: f64,
 }
 
 impl BlockGoal {
@@ -49,12 +42,11 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     /// Appends a run as [`WorkMesh::append`] does, after simplifying its blocks.
     pub fn append_simplified(&mut self, run: &TetMesh, goal: BlockGoal, params: &SimplifyParams) -> SimplifyReport {
         let goal = goal.of_one(params.blocks(run.positions.len()));
-        let (tets, owners) = split(run, params);
+        let Split { parts, numbers } = split(run, goal.shift, params);
         let surfaces = surface_quadrics(run, params.surface_weight);
-        let blocks = map(tets, |tets| {
-            let block = cut(run, &tets, &owners, &surfaces);
+        let blocks = map(parts, |part| {
             let mut mesh = Self::new(self.domain);
-            mesh.fill(&block, params);
+            mesh.fill(run, &part, (&numbers, &surfaces), params);
             let report = mesh.simplify_alone(goal, params);
             (mesh, report)
         });
@@ -64,12 +56,11 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         let first_vertex = self.vertices.len();
         let total = self.absorb_all(blocks, &mut glued, params.spread_weight);
         let total = SimplifyReport { vertices_in_window: self.vertices.len() - first_vertex, ..total };
-        self.stars = Stars::new(self.vertices.len(), &self.tets);
-        for ((position, quadric), _) in
-            run.positions.iter().zip(&surfaces).zip(&owners).filter(|&(_, &owner)| owner == SHARED)
-        {
-            if let (Some(quadric), Some(&vertex)) = (quadric, glued.get(position)) {
-                self.surface_mut(vertex).add_scaled(quadric, 1.0);
+        // The blocks have the surfaces of all vertices but those that are shared.
+        let shared = run.positions.iter().zip(&surfaces).zip(&numbers).filter(|&(_, &number)| number == SHARED);
+        for ((position, surface), _) in shared {
+            if let (Some(surface), Some(&vertex)) = (surface, glued.get(position)) {
+                self.surface_mut(vertex).add_scaled(surface, 1.0);
             }
         }
         self.vertices.iter_mut().for_each(|vertex| vertex.frozen = false);
@@ -79,17 +70,14 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     /// Simplifies what is not frozen of the window block by block.
     pub fn simplify_blocks(&mut self, unfrozen: Unfrozen, goal: BlockGoal, params: &SimplifyParams) -> SimplifyReport {
         let goal = goal.of_one(params.blocks(self.vertices.len()));
-        let bands = Bands { count: params.blocks(self.vertices.len()) + 1, shift: 0.5, domain: self.domain };
-        let of_tet: Vec<u32> = (0..self.tets.len())
-            .map(|tet| bands.of(self.tets[tet].map(|v| self.vertices[v as usize].position)))
-            .collect();
+        let bands = Bands::new(params.blocks(self.vertices.len()), goal.shift, self.domain);
+        let of_tet = bands.of_tets(self.tets.len(), |tet| self.tets[tet].map(|v| self.vertices[v as usize].position));
         let mut owners = owners(self.vertices.len(), self.tets.iter().copied().zip(of_tet.iter().copied()));
         for (owner, vertex) in owners.iter_mut().zip(&self.vertices) {
             if *owner != NONE && unfrozen.freezes(vertex.position.z) {
                 *owner = SHARED;
             }
         }
-        self.stars = Stars::default();
         let blocks = self.take_blocks(&of_tet, &owners, bands.count);
         let blocks = map(blocks, |mut block: Self| {
             let report = block.simplify_alone(goal, params);
@@ -97,7 +85,6 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         });
         let mut glued = self.vertices.iter().zip(0..).map(|(vertex, number)| (vertex.position, number)).collect();
         let total = self.absorb_all(blocks, &mut glued, 0.0);
-        self.stars = Stars::new(self.vertices.len(), &self.tets);
         self.vertices.iter_mut().for_each(|vertex| vertex.frozen = false);
         total
     }
@@ -107,13 +94,10 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     fn take_blocks(&mut self, of_tet: &[u32], owners: &[u32], count: usize) -> Vec<Self> {
         let mut blocks: Vec<Self> = (0..count).map(|_| Self::new(self.domain)).collect();
         let mut numbers = vec![NONE; self.vertices.len()];
-        let mut order: Vec<u32> = (0..self.tets.len() as u32).collect();
-        order.sort_by_key(|&tet| of_tet[tet as usize]);
         let mut taken = vec![false; self.vertices.len()];
-        for same in order.chunk_by(|&a, &b| of_tet[a as usize] == of_tet[b as usize]) {
-            let block = &mut blocks[of_tet[same[0] as usize] as usize];
+        for (same, block) in by_band(of_tet, count).into_iter().zip(&mut blocks) {
             let mut members = Vec::new();
-            for &tet in same {
+            for tet in same {
                 let corners = self.tets[tet as usize].map(|v| {
                     if numbers[v as usize] == NONE {
                         let is_first = !std::mem::replace(&mut taken[v as usize], true);
@@ -126,7 +110,6 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
                 block.labels.push(self.labels[tet as usize]);
             }
             members.into_iter().for_each(|v| numbers[v as usize] = NONE);
-            block.stars = Stars::new(block.vertices.len(), &block.tets);
         }
         self.keep_shared(owners);
         blocks
@@ -169,7 +152,11 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     }
 
     /// Simplifies a block by itself.
-    fn simplify_alone(&mut self, BlockGoal { keep, max_error }: BlockGoal, params: &SimplifyParams) -> SimplifyReport {
+    fn simplify_alone(
+        &mut self,
+        BlockGoal { keep, max_error, .. }: BlockGoal,
+        params: &SimplifyParams,
+    ) -> SimplifyReport {
         let frozen = self.vertices.iter().filter(|vertex| vertex.frozen).count();
         let free = self.vertices.len() - frozen;
         let goal = Goal {
@@ -184,21 +171,29 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         report
     }
 
-    /// Fills an empty mesh with a block.
-    fn fill(&mut self, block: &Block, params: &SimplifyParams) {
-        let vertices: Vec<u32> = block
-            .mesh
-            .positions
-            .iter()
-            .zip(&block.frozen)
-            .map(|(&position, &frozen)| self.push_vertex(position, frozen))
-            .collect();
-        self.add_tets(&block.mesh, &vertices);
+    /// Fills an empty mesh with a part of a run.
+    fn fill(
+        &mut self,
+        run: &TetMesh,
+        part: &Part,
+        (numbers, surfaces): (&[u32], &[Option<PositionQuadric>]),
+        params: &SimplifyParams,
+    ) {
+        for &vertex in &part.vertices {
+            self.push_vertex(run.positions[vertex as usize], false);
+        }
+        let mut shared = HashMap::new();
+        for &tet in &part.tets {
+            let corners = run.tet_vertices(tet as usize).map(|v| match numbers[v.index()] {
+                SHARED => *shared.entry(v).or_insert_with(|| self.push_vertex(run.positions[v.index()], true)),
+                number => number,
+            });
+            self.add_tet(run, tet as usize, corners);
+        }
         self.spread(0, params.spread_weight);
-        self.stars = Stars::new(self.vertices.len(), &self.tets);
-        for (vertex, quadric) in vertices.into_iter().zip(&block.surfaces) {
-            if let Some(quadric) = quadric {
-                self.surface_mut(vertex).add_scaled(quadric, 1.0);
+        for (&vertex, number) in part.vertices.iter().zip(0..) {
+            if let Some(surface) = &surfaces[vertex as usize] {
+                self.surface_mut(number).add_scaled(surface, 1.0);
             }
         }
     }
@@ -262,6 +257,23 @@ struct Bands {
 }
 
 impl Bands {
+    /// `whole` bands, or one more of which the first and the last are narrower.
+    fn new(whole: usize, shift: f64, domain: Domain) -> Self {
+        Self { count: whole + usize::from(shift > 0.0), shift, domain }
+    }
+
+    /// The band of each tet, by its corners.
+    fn of_tets(&self, tets: usize, corners: impl Fn(usize) -> [IVec3; 4] + Send + Sync) -> Vec<u32> {
+        const CHUNK: usize = 1 << 14;
+        let mut of_tet = vec![0; tets];
+        for_each(of_tet.chunks_mut(CHUNK).enumerate().collect(), |(n, chunk): (usize, &mut [u32])| {
+            for (tet, band) in (n * CHUNK..).zip(chunk) {
+                *band = self.of(corners(tet));
+            }
+        });
+        of_tet
+    }
+
     /// The band of the tet with these corners.
     fn of(&self, corners: [IVec3; 4]) -> u32 {
         let axis = usize::from(self.domain.height > self.domain.width);
@@ -272,24 +284,48 @@ impl Bands {
     }
 }
 
-/// The tets of each band of a run, and which block its vertices are in.
-fn split(run: &TetMesh, params: &SimplifyParams) -> (Vec<Vec<u32>>, Vec<u32>) {
-    let bands = Bands { count: params.blocks(run.positions.len()), shift: 0.0, domain: run.domain };
-    let of_tet: Vec<u32> = (0..run.tets.len()).map(|tet| bands.of(run.tet_positions(tet))).collect();
+/// A run in parts.
+struct Split {
+    parts: Vec<Part>,
+    /// Of each vertex of the run, its number in the only part that has it, or [`SHARED`].
+    numbers: Vec<u32>,
+}
+
+/// The tets of one band of a run, and the vertices that it alone has.
+struct Part {
+    tets: Vec<u32>,
+    vertices: Vec<u32>,
+}
+
+fn split(run: &TetMesh, shift: f64, params: &SimplifyParams) -> Split {
+    let bands = Bands::new(params.blocks(run.positions.len()), shift, run.domain);
+    let of_tet = bands.of_tets(run.tets.len(), |tet| run.tet_positions(tet));
     let corners = (0..run.tets.len()).map(|tet| run.tet_vertices(tet).map(|v| v.0));
-    let mut owners = owners(run.positions.len(), corners.zip(of_tet.iter().copied()));
+    let mut numbers = owners(run.positions.len(), corners.zip(of_tet.iter().copied()));
     let times = || run.positions.iter().map(|p| p.z);
     let ends = [times().min(), times().max()];
-    for (owner, position) in owners.iter_mut().zip(&run.positions) {
+    let mut parts: Vec<Part> =
+        by_band(&of_tet, bands.count).into_iter().map(|tets| Part { tets, vertices: Vec::new() }).collect();
+    for ((vertex, number), position) in (0..).zip(&mut numbers).zip(&run.positions) {
         let sides = run.domain.sides(*position);
         let at_end = sides.contains(Sides::T_LOW) || sides.contains(Sides::T_HIGH);
         if ends.contains(&Some(position.z)) && !at_end {
-            *owner = SHARED;
+            *number = SHARED;
+        } else if let Some(part) = parts.get_mut(*number as usize) {
+            *number = part.vertices.len() as u32;
+            part.vertices.push(vertex);
         }
     }
-    let mut tets = vec![Vec::new(); bands.count];
-    of_tet.iter().zip(0..).for_each(|(&band, tet)| tets[band as usize].push(tet));
-    (tets, owners)
+    Split { parts, numbers }
+}
+
+/// The tets of each band.
+fn by_band(of_tet: &[u32], count: usize) -> Vec<Vec<u32>> {
+    let mut bands = vec![Vec::new(); count];
+    for (tet, &band) in (0..).zip(of_tet) {
+        bands[band as usize].push(tet);
+    }
+    bands
 }
 
 /// The only block that a vertex is in, or [`SHARED`].
@@ -302,29 +338,4 @@ fn owners(vertices: usize, tets: impl Iterator<Item = ([u32; 4], u32)>) -> Vec<u
         }
     }
     owners
-}
-
-/// The mesh of some of a run's tets.
-fn cut(run: &TetMesh, tets: &[u32], owners: &[u32], surfaces: &[Option<PositionQuadric>]) -> Block {
-    let mut vertices = HashMap::new();
-    let mut wedges = HashMap::new();
-    let mut mesh = TetMesh::empty(run.domain);
-    let mut frozen = Vec::new();
-    let mut own_surfaces = Vec::new();
-    for &tet in tets {
-        let corners = run.tets[tet as usize].map(|wedge| {
-            *wedges.entry(wedge).or_insert_with(|| {
-                let whole = run.wedges[wedge.index()];
-                let vertex = *vertices.entry(whole.vertex).or_insert_with(|| {
-                    let is_shared = owners[whole.vertex.index()] == SHARED;
-                    frozen.push(is_shared);
-                    own_surfaces.push(surfaces[whole.vertex.index()].filter(|_| !is_shared));
-                    mesh.push_vertex(run.positions[whole.vertex.index()])
-                });
-                mesh.push_wedge(Wedge { vertex, ..whole })
-            })
-        });
-        mesh.tets.push(corners);
-    }
-    Block { mesh, frozen, surfaces: own_surfaces }
 }

@@ -6,6 +6,7 @@ use super::SimplifyParams;
 use super::legality::{Limits, Refusal, RefusalCounts, Topology};
 use super::quadric::{PositionQuadric, WedgeQuadric};
 use super::queue::{BucketQueue, Entry};
+use super::stars::Stars;
 use super::work_mesh::{NONE, WorkMesh};
 
 /// Which part of the window may change, in lattice units of t: vertices at or before `low`, and at or after `high`,
@@ -40,6 +41,13 @@ pub struct Goal {
     /// Most that the next collapse's cost times the number of `vertices` left may be: as costs are nearly equal
     /// everywhere, this follows the squared error integrated over the part that is counted.
     pub max_error: f32,
+}
+
+impl Goal {
+    /// Whether few enough vertices are left.
+    fn is_reached(&self, report: &SimplifyReport) -> bool {
+        report.vertices <= self.vertices && report.vertices_in_window <= self.vertices_in_window
+    }
 }
 
 /// What a run did.
@@ -113,12 +121,18 @@ pub fn simplify<Q: WedgeQuadric>(
     };
     let count =
         |before: i32| mesh.vertices.iter().filter(|vertex| vertex.stamp != NONE && vertex.position.z < before).count();
-    let known_bits = (mesh.vertices.len() as u32 | 1).ilog2().clamp(4, KNOWN_BITS);
     let report = SimplifyReport {
         vertices: count(goal.before),
         vertices_in_window: count(unfrozen.high),
         ..SimplifyReport::default()
     };
+    // A window that only grows is done before it begins, and ranking its edges would be all the work there is.
+    if goal.is_reached(&report) {
+        return report;
+    }
+    mesh.stars = Stars::new(mesh.vertices.len(), &mesh.tets);
+    mesh.places = mesh.vertices.iter().map(|vertex| vertex.position).collect();
+    let known_bits = (mesh.vertices.len() as u32 | 1).ilog2().clamp(4, KNOWN_BITS);
     let mut run = Simplifier {
         alias: (0..mesh.vertices.len() as u32).collect(),
         mesh,
@@ -135,7 +149,10 @@ pub fn simplify<Q: WedgeQuadric>(
     };
     run.rank_edges();
     run.collapse();
-    run.report
+    let report = run.report;
+    mesh.stars = Stars::default();
+    mesh.places = Vec::new();
+    report
 }
 
 impl<Q: WedgeQuadric> Simplifier<'_, Q> {
@@ -194,14 +211,10 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
         (ranked, evaluations, refusals)
     }
 
-    fn is_done(&self) -> bool {
-        self.report.vertices <= self.goal.vertices && self.report.vertices_in_window <= self.goal.vertices_in_window
-    }
-
     fn collapse(&mut self) {
         let limit = BucketQueue::bucket(self.goal.max_cost);
         let mut collapses_before = u64::MAX;
-        while !self.is_done() {
+        while !self.goal.is_reached(&self.report) {
             let Some((bucket, entry)) = self.queue.pop() else {
                 // What was refused may have become possible, as long as something changed since.
                 if self.aside.is_empty() || self.report.collapses == collapses_before {
@@ -328,6 +341,13 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
         let mesh = &*self.mesh;
         let other = if origin == u { v } else { u };
         let shift = mesh.offset(mesh.vertices[other as usize].position, mesh.vertices[origin as usize].position);
+        let (own, others) = (&mesh.vertices[origin as usize].first, &mesh.vertices[other as usize].first);
+        if own.label == others.label && [own.next, others.next] == [NONE; 2] {
+            // Inside a label, as most are, the loops below come down to this.
+            let mut quadric = own.quadric;
+            quadric.add(&others.quadric.recentered(shift));
+            return quadric.reduced();
+        }
         let mut total = PositionQuadric::default();
         for wedge in mesh.wedges(origin) {
             let mut quadric = wedge.quadric;
@@ -433,6 +453,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         self.vertices[g].stamp = NONE;
         let kept = &mut self.vertices[k];
         kept.position = position;
+        self.places[k] = position;
         kept.sides = kept.sides.or(gone_sides);
         kept.stamp += 1;
     }

@@ -3,7 +3,6 @@
 use glam::Vec3;
 
 use super::quadric::WedgeQuadric;
-use super::stars::Stars;
 use super::work_mesh::{NONE, WorkMesh};
 use crate::mesh::{TetMesh, VertexId, Wedge, WedgeId};
 
@@ -26,10 +25,9 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
             }
         }
         self.pack();
-        self.stars = Stars::new(self.vertices.len(), &self.tets);
     }
 
-    /// Drops what has collapsed, and the stars, before the mesh is put aside.
+    /// Drops what has collapsed before the mesh is put aside.
     pub(super) fn compact(&mut self) {
         let mut tets = self.tets.iter();
         self.labels.retain(|_| tets.next().is_some_and(|tet| tet[0] != NONE));
@@ -37,7 +35,6 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         self.tets.shrink_to_fit();
         self.labels.shrink_to_fit();
         self.pack();
-        self.stars = Stars::default();
     }
 
     fn commit_wedge(&mut self, v: u32, label: crate::video::Label, committed: &mut TetMesh) -> WedgeId {

@@ -65,19 +65,37 @@ pub enum Topology {
     Strict,
 }
 
-#[inline]
-fn volume6_of([a, b, c, d]: [IVec3; 4]) -> i64 {
-    volume6(a, b, c, d)
+/// Volume and edges of a tet.
+#[derive(Clone, Copy)]
+struct Form {
+    /// Six times its volume, in cubic lattice units.
+    volume6: i64,
+    /// Sum of its squared edges.
+    edges: f32,
 }
 
-/// The cube of a tet's mean ratio, 12 (3 V)^(2/3) over the sum of its squared edges: 1 for a regular tet, 0 for a flat
-/// one. Liu and Joe, "Relationship between tetrahedron shape measures", 1994.
-#[inline]
-fn shape([a, b, c, d]: [IVec3; 4], volume6: i64) -> f32 {
-    let squared = |p: IVec3, q: IVec3| (q - p).as_vec3().length_squared();
-    let edges = squared(a, b) + squared(a, c) + squared(a, d) + squared(b, c) + squared(b, d) + squared(c, d);
-    // (12 / edges)^3 (V6 / 2)^2
-    432.0 * (volume6 as f32 / edges).powi(2) / edges
+impl Form {
+    #[inline(always)]
+    fn of([a, b, c, d]: [IVec3; 4]) -> Self {
+        let (u, v, w) = ((b - a).as_vec3(), (c - a).as_vec3(), (d - a).as_vec3());
+        // Squared distances between n points add up to n times their squares less the square of their sum.
+        let squares = u.length_squared() + v.length_squared() + w.length_squared();
+        Self { volume6: volume6(a, b, c, d), edges: 4.0 * squares - (u + v + w).length_squared() }
+    }
+
+    /// The cube of the mean ratio, 12 (3 V)^(2/3) over the sum of squared edges: 1 for a regular tet, 0 for a flat one.
+    /// Liu and Joe, "Relationship between tetrahedron shape measures", 1994.
+    #[inline]
+    fn shape(self) -> f32 {
+        // (12 / edges)^3 (V6 / 2)^2
+        432.0 * (self.volume6 as f32 / self.edges).powi(2) / self.edges
+    }
+
+    /// Whether [`Self::shape`] is less than `least`, without a division.
+    #[inline(always)]
+    fn is_flatter(self, least: f32) -> bool {
+        432.0 * (self.volume6 as f32).powi(2) < least * self.edges * self.edges * self.edges
+    }
 }
 
 /// What a merged vertex must respect.
@@ -97,7 +115,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     /// Positivity suffices for a tiling: the sum of signed volumes is kept, so positive tets cover each point once.
     pub(super) fn check_geometry(&self, [u, v]: [u32; 2], position: IVec3, limits: &Limits) -> Result<(), Refusal> {
         for (moved, other) in [(u, v), (v, u)] {
-            if self.vertices[moved as usize].position == position {
+            if self.place(moved) == position {
                 // Only tets that move can turn over, but a vertex that stays can still gain long ones from `other`.
                 continue;
             }
@@ -109,19 +127,18 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
                 // Written out: this is where the loop spends its time, and a closure here is not inlined.
                 let at = |n: usize| if corners[n] == moved { position } else { self.place(corners[n]) };
                 let moved_corners = [at(0), at(1), at(2), at(3)];
-                let volume = volume6_of(moved_corners);
-                if volume <= 0 {
+                let form = Form::of(moved_corners);
+                if form.volume6 <= 0 {
                     return Err(Refusal::Flip);
                 }
-                let shape = shape(moved_corners, volume);
-                if volume < limits.min_volume6 || shape < limits.min_shape {
+                let (is_small, is_flat) = (form.volume6 < limits.min_volume6, form.is_flatter(limits.min_shape));
+                if is_small || is_flat {
                     // A tet that was worse before is no reason to refuse what makes it better.
-                    let now = corners.map(|w| self.place(w));
-                    let volume_now = volume6_of(now);
-                    if volume < limits.min_volume6 && volume < volume_now {
+                    let now = Form::of(corners.map(|w| self.place(w)));
+                    if is_small && form.volume6 < now.volume6 {
                         return Err(Refusal::Flip);
                     }
-                    if shape < limits.min_shape && shape < self::shape(now, volume_now) {
+                    if is_flat && form.shape() < now.shape() {
                         return Err(Refusal::Sliver);
                     }
                 }
@@ -136,7 +153,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
 
     #[inline(always)]
     fn place(&self, vertex: u32) -> IVec3 {
-        self.vertices[vertex as usize].position
+        self.places[vertex as usize]
     }
 
     /// The label rule of [`Topology::Strict`]: one end's labels and sides include the other's, and an edge between two

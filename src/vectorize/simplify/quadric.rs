@@ -152,14 +152,17 @@ impl PositionQuadric {
                 r[axis] = value;
             }
         }
-        let matrix = Mat3::from_cols_array_2d(&m);
-        let determinant = matrix.determinant();
+        // Cramer's rule; the matrix is symmetric, and so are its cofactors.
+        let [[xx, xy, xt], [_, yy, yt], [_, _, tt]] = m;
+        let (cxx, cxy, cxt) = (yy * tt - yt * yt, xt * yt - xy * tt, xy * yt - xt * yy);
+        let (cyy, cyt, ctt) = (xx * tt - xt * xt, xy * xt - xx * yt, xx * yy - xy * xy);
+        let determinant = xx * cxx + xy * cxy + xt * cxt;
         let scale = m[0][0].abs() * m[1][1].abs() * m[2][2].abs();
         // Below this share of the diagonal's product the solution is noise in single precision.
         if determinant.is_nan() || determinant <= 1e-5 * scale {
             return None;
         }
-        let x = matrix.inverse() * Vec3::from_array(r);
+        let x = times(&[cxx, cxy, cxt, cyy, cyt, ctt], Vec3::from_array(r)) / determinant;
         x.is_finite().then_some(x)
     }
 }

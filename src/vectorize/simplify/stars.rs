@@ -1,5 +1,7 @@
 //! Tets around each vertex, in one pool of numbers, for a mesh that shrinks.
 
+use super::work_mesh::NONE;
+
 /// A vertex's slot in the pool.
 #[derive(Debug, Clone, Copy, Default)]
 struct Slot {
@@ -18,10 +20,11 @@ pub(super) struct Stars {
 }
 
 impl Stars {
-    /// Builds the stars of `tets` over `vertices` vertices by a counting sort.
+    /// Builds the stars of `tets` over `vertices` vertices by a counting sort. Tets that have vanished have no corners.
     pub(super) fn new(vertices: usize, tets: &[[u32; 4]]) -> Self {
         let mut slots = vec![Slot::default(); vertices];
-        for &v in tets.as_flattened() {
+        let is_live = |v: &&u32| **v != NONE;
+        for &v in tets.as_flattened().iter().filter(is_live) {
             slots[v as usize].capacity += 1;
         }
         let mut start = 0;
@@ -31,7 +34,7 @@ impl Stars {
         }
         let mut pool = vec![0; start as usize];
         for (tet, corners) in tets.iter().enumerate() {
-            for &v in corners {
+            for &v in corners.iter().filter(is_live) {
                 let slot = &mut slots[v as usize];
                 pool[(slot.start + slot.len) as usize] = tet as u32;
                 slot.len += 1;

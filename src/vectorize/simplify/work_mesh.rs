@@ -56,7 +56,10 @@ pub struct WorkMesh<Q> {
     pub(super) overflow: Vec<WorkWedge<Q>>,
     pub(super) tets: Vec<[u32; 4]>,
     pub(super) labels: Vec<Label>,
+    /// Tets around each vertex, while edges collapse.
     pub(super) stars: Stars,
+    /// Positions of the vertices once more, while edges collapse: checks wait for nothing else.
+    pub(super) places: Vec<IVec3>,
 }
 
 impl<Q: WedgeQuadric> WorkMesh<Q> {
@@ -71,6 +74,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
             tets: Vec::new(),
             labels: Vec::new(),
             stars: Stars::default(),
+            places: Vec::new(),
         }
     }
 
@@ -103,9 +107,10 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         };
         let first_vertex = self.vertices.len();
         let vertices: Vec<u32> = run.positions.iter().map(|position| place(self, position)).collect();
-        self.add_tets(run, &vertices);
+        for tet in 0..run.tets.len() {
+            self.add_tet(run, tet, run.tet_vertices(tet).map(|v| vertices[v.index()]));
+        }
         self.spread(first_vertex, params.spread_weight);
-        self.stars = Stars::new(self.vertices.len(), &self.tets);
         for (vertex, quadric) in vertices.iter().zip(surface_quadrics(run, params.surface_weight)) {
             if let Some(quadric) = quadric {
                 self.surface_mut(*vertex).add_scaled(&quadric, 1.0);
@@ -132,13 +137,19 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         self.vertices.len() as u32 - 1
     }
 
-    /// Adds the tets of `run`, whose vertices are `vertices` here, with their colours' quadrics.
-    pub(super) fn add_tets(&mut self, run: &TetMesh, vertices: &[u32]) {
-        for (tet, corners) in run.tets.iter().enumerate() {
-            self.tets.push(corners.map(|w| vertices[run.vertex(w).index()]));
-            self.labels.push(run.tet_label(tet));
+    /// Adds a tet of `run`, whose corners are `corners` here, with its colours' quadrics.
+    pub(super) fn add_tet(&mut self, run: &TetMesh, tet: usize, corners: [u32; 4]) {
+        let label = run.tet_label(tet);
+        self.tets.push(corners);
+        self.labels.push(label);
+        let unit = self.domain.unit() as f32;
+        let positions = run.tet_positions(tet).map(|p| p.as_vec3() / unit);
+        let colors = run.tets[tet].map(|w| run.wedges[w.index()].color);
+        let (gradient, volume) = linear_field(positions, colors);
+        for (vertex, color) in corners.into_iter().zip(colors) {
+            let field = TetField { gradient, color, weight: 0.25 * volume };
+            self.wedge_mut(vertex, label).quadric.add(&Q::of_tet(&field));
         }
-        self.add_color_quadrics(run, vertices);
     }
 
     /// Gives the vertices from `first` on, other than frozen ones, their part in the uniformity term.
@@ -191,20 +202,6 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     #[inline]
     pub(super) fn offset(&self, from: IVec3, to: IVec3) -> Vec3 {
         (to - from).as_vec3() / self.domain.unit() as f32
-    }
-
-    fn add_color_quadrics(&mut self, run: &TetMesh, vertices: &[u32]) {
-        let unit = self.domain.unit() as f32;
-        for (tet, corners) in run.tets.iter().enumerate() {
-            let positions = run.tet_positions(tet).map(|p| p.as_vec3() / unit);
-            let colors = corners.map(|w| run.wedges[w.index()].color);
-            let (gradient, volume) = linear_field(positions, colors);
-            for (corner, wedge) in corners.iter().enumerate() {
-                let field = TetField { gradient, color: colors[corner], weight: 0.25 * volume };
-                let vertex = vertices[run.vertex(*wedge).index()];
-                self.wedge_mut(vertex, run.tet_label(tet)).quadric.add(&Q::of_tet(&field));
-            }
-        }
     }
 
     /// The surface quadric of `vertex`, made if there is none.
