@@ -1,8 +1,9 @@
 //! How much of a pixel a triangle covers, exactly: the area of their common part, and its moment.
 //!
 //! Places are in pixels from a pixel's centre, so a pixel is the square [-1/2, 1/2]^2 of area 1. A side of the triangle
-//! cuts the pixel if its value at the centre, scaled so that |x| + |y| of the normal is 1, lies within +-1/2. Pixels cut
-//! once or twice, nearly all, have formulas of their own: this runs for each triangle at each pixel on a boundary.
+//! cuts the pixel if its value at the centre lies within +-(|x| + |y|) / 2 of its normal. Pixels cut once or twice, nearly
+//! all, have formulas of their own: this runs for each triangle at each pixel on a boundary. For the same reason normals
+//! are of any length, which saves divisions.
 
 use glam::DVec2;
 
@@ -43,13 +44,20 @@ impl Part {
 /// What lies where normal . place + value >= 0.
 #[derive(Debug, Clone, Copy)]
 struct HalfPlane {
-    /// |x| + |y| = 1.
+    /// Points inwards; not 0.
     normal: DVec2,
     /// Value at a pixel's centre.
     value: f64,
+    /// Half of |x| + |y|: how far values within the pixel differ from that at its centre.
+    reach: f64,
 }
 
 impl HalfPlane {
+    #[inline]
+    fn new(normal: DVec2, value: f64) -> Self {
+        Self { normal, value, reach: 0.5 * (normal.x.abs() + normal.y.abs()) }
+    }
+
     /// Its share of a pixel that it cuts: a trapezium, or all but a corner, or a corner.
     #[inline]
     fn part(&self) -> Part {
@@ -62,7 +70,7 @@ impl HalfPlane {
             let (middle, slope) = (self.value * scale, b * scale);
             (0.5 + middle, 0.5 * (middle * middle + slope * slope / 12.0 - 0.25), -slope / 12.0)
         } else {
-            let height = 0.5 - self.value.abs();
+            let height = self.reach - self.value.abs();
             let scale = height / (a * b);
             let corner = 0.5 * height * scale;
             let (along, across) = (-corner * (0.5 - scale * b / 3.0), -corner * (0.5 - scale * a / 3.0));
@@ -73,15 +81,13 @@ impl HalfPlane {
         Part { area, moment: DVec2::new(-mx.copysign(mx * self.normal.x), -my.copysign(my * self.normal.y)) }
     }
 
-    /// A point of the line within a pixel that it cuts.
+    /// Whether a line through the pixel holds a point of another one's border: that on the diagonal towards its normal,
+    /// which is in the pixel whatever the slope.
     #[inline]
-    fn point(&self) -> DVec2 {
-        DVec2::new(-self.value.copysign(self.value * self.normal.x), -self.value.copysign(self.value * self.normal.y))
-    }
-
-    #[inline]
-    fn holds(&self, place: DVec2) -> bool {
-        self.normal.dot(place) + self.value >= 0.0
+    fn holds_border_of(&self, other: &Self) -> bool {
+        let across = self.normal.x.copysign(self.normal.x * other.normal.x)
+            + self.normal.y.copysign(self.normal.y * other.normal.y);
+        2.0 * other.reach * self.value >= across * other.value
     }
 }
 
@@ -103,8 +109,8 @@ impl Coverage {
         let [p, q, r] = [center_offset(a, origin), center_offset(b, origin), center_offset(c, origin)];
         let side = |from: GridPoint, to: GridPoint, place: DVec2| {
             let (dx, dy) = ((to.x - from.x) as f64, (to.y - from.y) as f64);
-            let normal = DVec2::new(-dy, dx) / (dx.abs() + dy.abs());
-            HalfPlane { normal, value: -normal.dot(place) }
+            let normal = DVec2::new(-dy, dx);
+            HalfPlane::new(normal, -normal.dot(place))
         };
         Self { sides: [side(a, b, p), side(b, c, q), side(c, a, r)], corners: [p, q, r], origin }
     }
@@ -113,33 +119,33 @@ impl Coverage {
     #[inline]
     pub(super) fn of(&self, [column, row]: [i32; 2]) -> Part {
         let step = DVec2::new(f64::from(column - self.origin[0]), f64::from(row - self.origin[1]));
-        let value = |i: usize| self.sides[i].value + self.sides[i].normal.dot(step);
-        let (a, b, c) = (value(0), value(1), value(2));
-        if (a <= -0.5) | (b <= -0.5) | (c <= -0.5) {
+        let side =
+            |i: usize| HalfPlane { value: self.sides[i].value + self.sides[i].normal.dot(step), ..self.sides[i] };
+        let (a, b, c) = (side(0), side(1), side(2));
+        if (a.value <= -a.reach) | (b.value <= -b.reach) | (c.value <= -c.reach) {
             return Part::NOTHING;
         }
-        let side = |i: usize, value: f64| HalfPlane { normal: self.sides[i].normal, value };
-        match (a < 0.5, b < 0.5, c < 0.5) {
+        match (a.value < a.reach, b.value < b.reach, c.value < c.reach) {
             (false, false, false) => Part::PIXEL,
-            (true, false, false) => side(0, a).part(),
-            (false, true, false) => side(1, b).part(),
-            (false, false, true) => side(2, c).part(),
-            (true, true, false) => cut_twice(side(0, a), side(1, b), self.corners[1] - step),
-            (false, true, true) => cut_twice(side(1, b), side(2, c), self.corners[2] - step),
-            (true, false, true) => cut_twice(side(2, c), side(0, a), self.corners[0] - step),
-            (true, true, true) => cut([side(0, a), side(1, b), side(2, c)]),
+            (true, false, false) => a.part(),
+            (false, true, false) => b.part(),
+            (false, false, true) => c.part(),
+            (true, true, false) => cut_twice(&a, &b, self.corners[1] - step),
+            (false, true, true) => cut_twice(&b, &c, self.corners[2] - step),
+            (true, false, true) => cut_twice(&c, &a, self.corners[0] - step),
+            (true, true, true) => cut([a, b, c]),
         }
     }
 }
 
 /// The part of a pixel between two sides that cut it and meet in `corner`.
 #[inline]
-fn cut_twice(to: HalfPlane, from: HalfPlane, corner: DVec2) -> Part {
+fn cut_twice(to: &HalfPlane, from: &HalfPlane, corner: DVec2) -> Part {
     if corner.x.abs() < 0.5 && corner.y.abs() < 0.5 {
         return wedge(to, from, corner);
     }
     // The lines do not cross in the pixel, so each lies on one side of the other.
-    match (to.holds(from.point()), from.holds(to.point())) {
+    match (to.holds_border_of(from), from.holds_border_of(to)) {
         (true, true) => {
             let (one, other) = (to.part(), from.part());
             Part { area: (one.area + other.area - 1.0).max(0.0), moment: one.moment + other.moment }
@@ -152,7 +158,7 @@ fn cut_twice(to: HalfPlane, from: HalfPlane, corner: DVec2) -> Part {
 
 /// The part of a pixel between two sides that meet in its inside.
 #[inline]
-fn wedge(to: HalfPlane, from: HalfPlane, corner: DVec2) -> Part {
+fn wedge(to: &HalfPlane, from: &HalfPlane, corner: DVec2) -> Part {
     let (first, mut side) = leave(corner, DVec2::new(from.normal.y, -from.normal.x));
     let (last, end) = leave(corner, DVec2::new(-to.normal.y, to.normal.x));
     let between = std::iter::from_fn(|| {
@@ -220,7 +226,7 @@ mod tests {
     use crate::render::scan::{GRID_BITS, is_positive};
 
     /// No bound.
-    const ALL: HalfPlane = HalfPlane { normal: DVec2::X, value: 1.0 };
+    const ALL: HalfPlane = HalfPlane { normal: DVec2::X, value: 1.0, reach: 0.5 };
 
     fn triangle(corners: [[f64; 2]; 3]) -> [GridPoint; 3] {
         let grid = |v: f64| (v * f64::from(1 << GRID_BITS)) as i64;
@@ -234,7 +240,10 @@ mod tests {
 
     fn half_plane(degrees: i32, value: f64) -> HalfPlane {
         let direction = DVec2::from_angle(f64::from(degrees).to_radians());
-        HalfPlane { normal: direction / (direction.x.abs() + direction.y.abs()), value }
+        let reach = 0.5 * (direction.x.abs() + direction.y.abs());
+        // Of a length that differs from angle to angle.
+        let length = f64::from(1 + degrees % 7) / reach;
+        HalfPlane::new(direction * length, 2.0 * value * reach * length)
     }
 
     /// One cut by formula is what clipping gives, all around and at every height.
@@ -255,8 +264,9 @@ mod tests {
             for (v, w) in (-9..=9).flat_map(|v| (-9..=9).map(move |w| (f64::from(v) / 19.0, f64::from(w) / 19.0))) {
                 let (to, from) = (half_plane(one, v), half_plane(one + turn, w));
                 let (n, m) = (to.normal, from.normal);
+                let (v, w) = (to.value, from.value);
                 let corner = DVec2::new(w * n.y - v * m.y, v * m.x - w * n.x) / n.perp_dot(m);
-                assert_near(cut_twice(to, from, corner), cut([to, from, ALL]));
+                assert_near(cut_twice(&to, &from, corner), cut([to, from, ALL]));
             }
         }
     }

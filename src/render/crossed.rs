@@ -96,7 +96,6 @@ impl Crossed {
     }
 
     /// Adds what a triangle, whose colours are `shade`, covers of the pixels.
-    #[inline]
     pub(super) fn add(&mut self, triangle: &Triangle, shade: &Shade) {
         if self.sums.is_empty() {
             return;
@@ -106,21 +105,24 @@ impl Crossed {
         };
         let from_first = Rows::MAX << (rows.start - self.rows.start);
         let within = from_first & Rows::MAX >> (self.rows.start + Rows::BITS as i32 - rows.end);
-        let mut coverage = None;
-        let (start, end) = (columns.start as usize, columns.end as usize);
-        for tile in (start / TILE..=(end - 1) / TILE).filter(|&tile| self.tiles[tile] & within != 0) {
-            for column in start.max(tile * TILE)..end.min((tile + 1) * TILE) {
-                let marked = self.columns[column];
+        let tiles = columns.start as usize / TILE..=(columns.end as usize - 1) / TILE;
+        let mut tiles = tiles.filter(|&tile| self.tiles[tile] & within != 0).peekable();
+        if tiles.peek().is_none() {
+            return;
+        }
+        let coverage = Coverage::new(triangle.corners, [columns.start, rows.start]);
+        for tile in tiles {
+            let in_tile = (tile * TILE) as i32..((tile + 1) * TILE) as i32;
+            for column in columns.start.max(in_tile.start)..columns.end.min(in_tile.end) {
+                let marked = self.columns[column as usize];
                 let mut left = marked & within;
                 while left != 0 {
                     let row = left.trailing_zeros();
                     left &= left - 1;
-                    let pixel = self.before[column] + (marked & ((1 << row) - 1)).count_ones();
-                    let place = [column as i32, self.rows.start + row as i32];
-                    let part = coverage
-                        .get_or_insert_with(|| Coverage::new(triangle.corners, [columns.start, rows.start]))
-                        .of(place);
+                    let place = [column, self.rows.start + row as i32];
+                    let part = coverage.of(place);
                     if part.area > 0.0 {
+                        let pixel = self.before[column as usize] + (marked & ((1 << row) - 1)).count_ones();
                         self.sums[pixel as usize] += shade.integral(place, part).extend(part.area as f32);
                     }
                 }
