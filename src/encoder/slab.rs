@@ -21,8 +21,11 @@ const TRANSITION_RATIO: f64 = 0.1;
 /// the window, where they compete with all others.
 const RUN_RATIO: f64 = 2.0;
 
-/// The same for blocks of the window, pass by pass, each along other lines ([`BlockGoal::shift`]): what is left to the last
-/// pass over the whole runs on one core.
+/// How many times the vertices that a window is to have it may grow to before its blocks are simplified.
+const GROWTH: f64 = 1.5;
+
+/// The same for blocks of the window at the slab's end, pass by pass, each along other lines ([`BlockGoal::shift`]): the
+/// last pass, over the whole, runs on one core, so little is left to it.
 const WINDOW_PASSES: [BlockPass; 2] = [BlockPass { shift: 0.5, ratio: 1.5 }, BlockPass { shift: 0.0, ratio: 1.1 }];
 
 /// A pass over the window in blocks.
@@ -188,13 +191,6 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         BlockGoal { keep: keep.min(1.0), max_error: f32::INFINITY, shift: 0.0 }
     }
 
-    /// How far the blocks of the window are simplified at the slab's end, where that is worth the trouble.
-    fn goal_of_blocks(&self, goal: &Goal, pass: &BlockPass) -> Option<BlockGoal> {
-        let keep = pass.ratio * goal.vertices as f64 / self.work.vertex_count() as f64;
-        let is_whole = goal.before == i32::MAX && self.frozen < 0 && !self.is_steered();
-        (is_whole && keep < 1.0).then_some(BlockGoal { keep, max_error: f32::INFINITY, shift: pass.shift })
-    }
-
     /// Whether the error decides, not the ratio.
     fn is_steered(&self) -> bool {
         self.target_error > 0.0
@@ -212,17 +208,24 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
 
     /// Simplifies and hands on; with `frames` the slab has ended and has that many.
     fn step(&mut self, frames: Option<u32>, observer: &mut Observer) -> Result<Vec<Packet>, EncodeError> {
-        let unit = self.committed.domain.unit();
+        let is_whole = self.kept == u32::MAX;
         let lead = self.lead as i32;
-        let high = if frames.is_some() { i32::MAX } else { lead * unit };
         let goal = self.goal(frames, lead);
+        let high = if frames.is_some() { i32::MAX } else { lead * self.committed.domain.unit() };
         let unfrozen = Unfrozen { low: self.frozen, high };
+        if is_whole && frames.is_none() {
+            // Nothing is handed on before the slab ends: only memory is at stake, and that roughly.
+            if self.work.vertex_count() as f64 > GROWTH * goal.vertices_in_window as f64 {
+                observer.tell(Event::Began(Stage::Simplify));
+                self.simplify_blocks(unfrozen, goal.vertices_in_window, 0.5, observer);
+                observer.tell(Event::Ended);
+            }
+            return Ok(Vec::new());
+        }
         observer.tell(Event::Began(Stage::Simplify));
-        for pass in &WINDOW_PASSES {
-            if let Some(goal) = self.goal_of_blocks(&goal, pass) {
-                let report = self.work.simplify_blocks(unfrozen, goal, &self.simplify_params);
-                log::debug!("blocks of the window: {report:?}");
-                observer.tell(Event::Simplified(report));
+        if is_whole && !self.is_steered() {
+            for pass in &WINDOW_PASSES {
+                self.simplify_blocks(unfrozen, (pass.ratio * goal.vertices as f64) as usize, pass.shift, observer);
             }
         }
         let report = simplify(&mut self.work, unfrozen, goal, &self.simplify_params);
@@ -234,11 +237,19 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             // What the goal counted.
             None => self.frozen.max(goal.before - 1),
         };
-        // A window that only grows neither collapses nor hands on anything.
-        if report.collapses > 0 || self.frozen >= 0 {
-            self.work.commit(self.frozen, &mut self.committed);
-        }
+        self.work.commit(self.frozen, &mut self.committed);
         self.send_ready(frames, observer)
+    }
+
+    /// Simplifies the window in blocks to about so many vertices.
+    fn simplify_blocks(&mut self, unfrozen: Unfrozen, vertices: usize, shift: f64, observer: &mut Observer) {
+        let keep = vertices as f64 / self.work.vertex_count() as f64;
+        if keep < 1.0 {
+            let goal = BlockGoal { keep, max_error: f32::INFINITY, shift };
+            let report = self.work.simplify_blocks(unfrozen, goal, &self.simplify_params);
+            log::debug!("blocks of the window: {report:?}");
+            observer.tell(Event::Simplified(report));
+        }
     }
 
     /// What the next commit will take must have reached the simplification ratio. Between it and the frozen leading
@@ -299,19 +310,21 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         hops(&self.committed, stars, self.sent - 1).into_iter().map(|hop| hop >= FAR).collect()
     }
 
-    /// Fits what is unsent, in parts by time where it is large: memory follows the part.
+    /// Fits what is unsent, in parts across the picture where it is large: memory follows the part. Tets are long in time
+    /// but not in space, so bands have few neighbours that would be looked at twice.
     fn fit(&mut self, stars: &StarTable) -> Result<FitReport, EncodeError> {
         let free = self.unsent(stars);
-        let mut times: Vec<i32> =
-            free.iter().zip(&self.committed.positions).filter(|(free, _)| **free).map(|(_, p)| p.z).collect();
-        times.sort_unstable();
-        let parts = times.len().div_ceil(FIT_VERTICES).max(1);
+        let axis = usize::from(self.committed.domain.height > self.committed.domain.width);
+        let mut places: Vec<i32> =
+            free.iter().zip(&self.committed.positions).filter(|(free, _)| **free).map(|(_, p)| p[axis]).collect();
+        places.sort_unstable();
+        let parts = places.len().div_ceil(FIT_VERTICES).max(1);
         let mut total = FitReport::default();
         let mut low = i32::MIN;
         for part in 1..=parts {
-            let high = if part == parts { i32::MAX } else { times[part * times.len() / parts] };
+            let high = if part == parts { i32::MAX } else { places[part * places.len() / parts] };
             let positions = &self.committed.positions;
-            let in_part = |v: usize| free[v] && (low..high).contains(&positions[v].z);
+            let in_part = |v: usize| free[v] && (low..high).contains(&positions[v][axis]);
             let free: Vec<bool> = (0..free.len()).map(in_part).collect();
             let report = fit(&mut FitRequest {
                 mesh: &mut self.committed,

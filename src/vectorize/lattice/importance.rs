@@ -12,7 +12,7 @@
 
 use super::axis::{Axis, CELL};
 use super::samples::{Grid, LEVELS};
-use crate::vectorize::parallel::for_each;
+use crate::vectorize::parallel::{for_each, map};
 use crate::video::Label;
 
 /// Importance of a vertex that labels ask for.
@@ -93,30 +93,38 @@ impl Importance {
     }
 
     /// Raises the vertices of step `step` with `odd` odd coordinates to the most of those at `offsets`, of which each
-    /// kind of vertex uses some.
+    /// kind of vertex uses some, and which have another number of odd coordinates or another step.
     fn gather(&mut self, step: usize, odd: i32, offsets: &Offsets) {
+        let planes: Vec<usize> = (0..self.size[2]).step_by(step).collect();
+        let raised = map(planes.clone(), |z| self.raised_plane(z, step, odd, offsets));
+        for (z, plane) in planes.into_iter().zip(raised) {
+            self.planes[z] = plane;
+        }
+    }
+
+    /// Plane `z` as [`Self::gather`] leaves it.
+    fn raised_plane(&self, z: usize, step: usize, odd: i32, offsets: &Offsets) -> Vec<f32> {
         let [columns, lines, planes] = self.size;
-        for z in (0..planes).step_by(step) {
-            for y in (0..lines).step_by(step) {
-                // Along x every second vertex has the right number of odd coordinates, or none has.
-                let first = match odd - ((z / step) & 1) as i32 - ((y / step) & 1) as i32 {
-                    1 => step,
-                    0 => 0,
-                    _ => continue,
-                };
-                for x in (first..columns).step_by(2 * step) {
-                    let pattern = ((x / step) & 1) | (((y / step) & 1) << 1) | (((z / step) & 1) << 2);
-                    let mut most = self.planes[z][y * columns + x];
-                    for &[dx, dy, dz] in &offsets[pattern] {
-                        let at = [x.wrapping_add_signed(dx), y.wrapping_add_signed(dy), z.wrapping_add_signed(dz)];
-                        if at[0] < columns && at[1] < lines && at[2] < planes {
-                            most = most.max(self.planes[at[2]][at[1] * columns + at[0]]);
-                        }
+        let mut plane = self.planes[z].clone();
+        for y in (0..lines).step_by(step) {
+            // Along x every second vertex has the right number of odd coordinates, or none has.
+            let first = match odd - ((z / step) & 1) as i32 - ((y / step) & 1) as i32 {
+                1 => step,
+                0 => 0,
+                _ => continue,
+            };
+            for x in (first..columns).step_by(2 * step) {
+                let pattern = ((x / step) & 1) | (((y / step) & 1) << 1) | (((z / step) & 1) << 2);
+                let most = &mut plane[y * columns + x];
+                for &[dx, dy, dz] in &offsets[pattern] {
+                    let at = [x.wrapping_add_signed(dx), y.wrapping_add_signed(dy), z.wrapping_add_signed(dz)];
+                    if at[0] < columns && at[1] < lines && at[2] < planes {
+                        *most = most.max(self.planes[at[2]][at[1] * columns + at[0]]);
                     }
-                    self.planes[z][y * columns + x] = most;
                 }
             }
         }
+        plane
     }
 
     /// The importance that `count` vertices exceed; those that labels need are not counted.

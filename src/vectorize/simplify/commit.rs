@@ -1,6 +1,6 @@
 //! Handing on: tets that can no longer change move from the working mesh to the slab's committed mesh.
 
-use glam::Vec3;
+use glam::{IVec3, Vec3};
 
 use super::quadric::WedgeQuadric;
 use super::work_mesh::{NONE, WorkMesh};
@@ -12,19 +12,30 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     pub fn commit(&mut self, low: i32, committed: &mut TetMesh) {
         let tets = std::mem::take(&mut self.tets);
         let labels = std::mem::take(&mut self.labels);
-        for (tet, label) in tets.into_iter().zip(labels) {
-            if tet[0] == NONE {
-                continue;
-            }
+        let mut ready = Vec::new();
+        for (number, tet) in (0..).zip(&tets).filter(|(_, tet)| tet[0] != NONE) {
             if tet.iter().all(|&v| self.vertices[v as usize].position.z <= low) {
-                let corners = tet.map(|v| self.commit_wedge(v, label, committed));
-                committed.tets.push(corners);
+                ready.push(self.place_in_curve(tet) << u32::BITS | number);
             } else {
-                self.tets.push(tet);
-                self.labels.push(label);
+                self.tets.push(*tet);
+                self.labels.push(labels[number as usize]);
             }
         }
+        // Neighbours next to each other: fit and writing, which go from tet to tet, find them in the caches.
+        ready.sort_unstable();
+        for number in ready.into_iter().map(|ready| ready as u32 as usize) {
+            let corners = tets[number].map(|v| self.commit_wedge(v, labels[number], committed));
+            committed.tets.push(corners);
+        }
         self.pack();
+    }
+
+    /// How far along Morton's curve through the box a tet lies, in 30 bits.
+    fn place_in_curve(&self, tet: &[u32; 4]) -> u64 {
+        let extent = self.domain.extent();
+        let middle = tet.iter().map(|&v| self.vertices[v as usize].position).sum::<IVec3>() / 4;
+        let axis = |n: usize| spread(i64::from(middle[n]) as u64 * 1023 / extent[n].max(1) as u64) << n;
+        axis(0) | axis(1) | axis(2)
     }
 
     /// Drops what has collapsed before the mesh is put aside.
@@ -94,6 +105,14 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
             }
         }
     }
+}
+
+/// The lowest ten bits, each followed by two zeros.
+fn spread(bits: u64) -> u64 {
+    let bits = (bits | bits << 16) & 0x0300_00ff;
+    let bits = (bits | bits << 8) & 0x0300_f00f;
+    let bits = (bits | bits << 4) & 0x030c_30c3;
+    (bits | bits << 2) & 0x0924_9249
 }
 
 fn retain_numbered<T>(items: &mut Vec<T>, number: &[u32]) {
