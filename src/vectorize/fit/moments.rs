@@ -1,8 +1,8 @@
 //! What the frames say about each fine tet: moments of its pixels' weights and colours.
 //!
-//! In: fine tets at their positions, and frames. Out: per tet that covers a pixel, sums from which the squared error,
-//! its gradient and its Gauss-Newton matrix follow for any colours, without another look at the pixels.
-//! A pixel counts where its centre lies in a slice of the tet, in exactly one tet (half-open spans whose ends are
+//! In: fine tets at their positions, and frames. Out: per tet sums from which the squared error, its gradient and its
+//! Gauss-Newton matrix follow for any colours, without another look at the pixels; and the parts of marked pixels.
+//! An unmarked pixel counts where its centre lies in a slice of the tet, in exactly one tet (half-open spans whose ends are
 //! computed from each edge in one direction); inverted tets count nothing, since they are drawn over.
 
 use glam::{DVec3, IVec3, Mat3, Vec3, Vec4};

@@ -129,16 +129,13 @@ impl<'a> NormalEquations<'a> {
                 }
             }
         });
-        if edges.len() > 0 {
-            let more = collect(edges.len(), nodes + points, |row, out: &mut [Vec3]| {
-                let change = change(row);
-                edges.color_terms(row, model, |node, weight| out[node] += change * weight);
-                if let Some(motion) = &self.motion {
-                    motion.terms(row, self, |point, matrix| out[nodes + point] += matrix.transpose() * change);
-                }
-            });
-            sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
-        }
+        add_all(&mut sums, edges.len(), |row, out: &mut [Vec3]| {
+            let change = change(row);
+            edges.color_terms(row, model, |node, weight| out[node] += change * weight);
+            if let Some(motion) = &self.motion {
+                motion.terms(row, self, |point, matrix| out[nodes + point] += matrix.transpose() * change);
+            }
+        });
         let mut out = model.colors_back.times(&sums[..nodes]);
         if points > 0 {
             out.extend(model.positions_back.times(&sums[nodes..]));
@@ -156,14 +153,11 @@ impl<'a> NormalEquations<'a> {
                 out[node as usize] += moments[m].diagonal(corner);
             }
         });
-        if edges.len() > 0 {
-            let more = collect(edges.len(), count, |row, out: &mut [f32]| {
-                let mut weights = Terms::<f32>::default();
-                edges.color_terms(row, model, |node, weight| weights.add(node, weight));
-                weights.for_each(|node, weight| out[node] += weight * weight);
-            });
-            nodes.iter_mut().zip(more).for_each(|(node, more)| *node += more);
-        }
+        add_all(&mut nodes, edges.len(), |row, out: &mut [f32]| {
+            let mut weights = Terms::<f32>::default();
+            edges.color_terms(row, model, |node, weight| weights.add(node, weight));
+            weights.for_each(|node, weight| out[node] += weight * weight);
+        });
         let diagonal = |wedge: usize| self.model.colors_back.row(wedge).map(|(n, w)| w * w * nodes[n]).sum::<f32>();
         parallel::map(self.wedges(), |wedge| 1.0 / (diagonal(wedge) + self.damping[wedge]).max(f32::MIN_POSITIVE))
     }
@@ -178,14 +172,11 @@ impl<'a> NormalEquations<'a> {
                 out[point] += block.scaled(moments[m].diagonal(corner));
             }
         });
-        if edges.len() > 0 {
-            let more = collect(edges.len(), points.len(), |row, out: &mut [Block]| {
-                let mut matrices = Terms::<Mat3>::default();
-                motion.terms(row, self, |point, matrix| matrices.add(point, matrix));
-                matrices.for_each(|point, matrix| out[point] += Block::of(&matrix));
-            });
-            points.iter_mut().zip(more).for_each(|(point, more)| *point += more);
-        }
+        add_all(&mut points, edges.len(), |row, out: &mut [Block]| {
+            let mut matrices = Terms::<Mat3>::default();
+            motion.terms(row, self, |point, matrix| matrices.add(point, matrix));
+            matrices.for_each(|point, matrix| out[point] += Block::of(&matrix));
+        });
         let rows = parallel::map(model.positions_back.rows(), |vertex| {
             let mut block = Block::default();
             model.positions_back.row(vertex).for_each(|(p, w)| block += points[p].scaled(w * w));
@@ -295,6 +286,17 @@ impl AddAssign for Block {
     fn add_assign(&mut self, other: Self) {
         self.diagonal += other.diagonal;
         self.off += other.off;
+    }
+}
+
+/// Adds to `sums` what [`collect`] finds; where there are no items, without a vector for it.
+fn add_all<T>(sums: &mut [T], items: usize, add: impl Fn(usize, &mut [T]) + Sync + Send)
+where
+    T: Copy + Default + AddAssign + Send + Sync,
+{
+    if items > 0 {
+        let more = collect(items, sums.len(), add);
+        sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
     }
 }
 

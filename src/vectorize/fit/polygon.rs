@@ -3,6 +3,8 @@
 //! In: a tet's corners, a time. Out: a convex polygon; the pixels whose centres it holds, or the part of a pixel's
 //! square that it covers. Forbidden here: colours.
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3, Vec4};
 
 /// Six times the volume (cubic pixels) below which a tet counts as flat: far below the smallest tet of any lattice
@@ -69,14 +71,8 @@ impl Polygon {
     }
 
     /// Rows of pixels that it touches.
-    pub(super) fn rows(&self, height: u32) -> std::ops::Range<u32> {
-        let (low, high) = self.bounds(1);
-        low.clamp(0.0, f64::from(height)) as u32..high.ceil().clamp(0.0, f64::from(height)) as u32
-    }
-
-    fn bounds(&self, axis: usize) -> (f64, f64) {
-        let along = self.corners[..self.len].iter().map(|p| p[axis]);
-        along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+    pub(super) fn rows(&self, height: u32) -> Range<u32> {
+        touched(bounds(&self.corners[..self.len], 1), height)
     }
 
     /// The part of it in a row of pixels.
@@ -91,8 +87,7 @@ impl Polygon {
     /// Calls `span(y, from, to)` for every row of pixels whose centres the polygon holds.
     pub(super) fn spans(&self, width: u32, height: u32, mut span: impl FnMut(u32, u32, u32)) {
         let corners = &self.corners[..self.len];
-        let low = corners.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
-        let high = corners.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
+        let (low, high) = bounds(corners, 1);
         let rows = first_centre(low, height)..first_centre(high, height);
         if rows.is_empty() {
             return;
@@ -149,6 +144,19 @@ fn first_centre(x: f64, len: u32) -> u32 {
     whole + u32::from(f64::from(whole) < shifted)
 }
 
+/// The least and the greatest coordinate along an axis; infinities turned round where there are no corners.
+#[inline]
+fn bounds(corners: &[DVec2], axis: usize) -> (f64, f64) {
+    let along = corners.iter().map(|p| p[axis]);
+    along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+}
+
+/// The pixels of 0..len that bounds touch.
+#[inline]
+fn touched((low, high): (f64, f64), len: u32) -> Range<u32> {
+    low.clamp(0.0, f64::from(len)) as u32..high.ceil().clamp(0.0, f64::from(len)) as u32
+}
+
 /// Most corners of a quad after a cut at each side of a square.
 const CLIPPED: usize = 8;
 
@@ -161,10 +169,8 @@ pub(super) struct Clipped {
 
 impl Clipped {
     /// Columns of pixels that it touches.
-    pub(super) fn columns(&self, width: u32) -> std::ops::Range<u32> {
-        let along = self.corners[..self.len].iter().map(|p| p.x);
-        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-        low.clamp(0.0, f64::from(width)) as u32..high.ceil().clamp(0.0, f64::from(width)) as u32
+    pub(super) fn columns(&self, width: u32) -> Range<u32> {
+        touched(bounds(&self.corners[..self.len], 0), width)
     }
 
     /// Area and centroid of the part of it in a column of pixels; none if there is no area.

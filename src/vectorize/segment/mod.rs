@@ -61,29 +61,31 @@ pub struct SegmentedFrame {
 #[derive(Debug, Clone)]
 pub struct Segmenter {
     raster: Raster,
-    params: SegmentParams,
     /// The last frame pushed, of whatever slab.
     view: Option<SceneView>,
-    /// What every frame's labels are, where there is a single one.
-    uniform: LabelPlane,
-    /// Where a number of superpixels is asked for.
-    temporal: TemporalSuperpixels,
-    /// Where labels are chosen by content.
-    content: Content,
+    labeler: Labeler,
+}
+
+/// Where labels come from.
+#[derive(Debug, Clone)]
+enum Labeler {
+    Content(Box<Content>),
+    /// What every frame's labels are.
+    Uniform(LabelPlane),
+    Temporal(Box<TemporalSuperpixels>),
 }
 
 impl Segmenter {
     /// A segmenter for frames of this size, at the start of a slab.
     pub fn new(width: u32, height: u32, params: SegmentParams) -> Self {
-        let raster = Raster::new(width.max(1), height.max(1));
-        Self {
-            raster,
-            params,
-            view: None,
-            uniform: LabelPlane::uniform(width.max(1), height.max(1), Label(0)),
-            temporal: TemporalSuperpixels::new(raster, params.superpixels, params.min_area_px),
-            content: Content::new(raster, params),
-        }
+        let (width, height) = (width.max(1), height.max(1));
+        let raster = Raster::new(width, height);
+        let labeler = match params.superpixels {
+            0 => Labeler::Content(Box::new(Content::new(raster, params))),
+            1 => Labeler::Uniform(LabelPlane::uniform(width, height, Label(0))),
+            count => Labeler::Temporal(Box::new(TemporalSuperpixels::new(raster, count, params.min_area_px))),
+        };
+        Self { raster, view: None, labeler }
     }
 
     /// Whether `frame` shows another scene than the last frame pushed. The first frame of all does not.
@@ -93,8 +95,11 @@ impl Segmenter {
 
     /// Forgets the labels: the next frame starts afresh, from label 0.
     pub fn start_slab(&mut self) {
-        self.temporal.start_slab();
-        self.content = Content::new(self.raster, self.params);
+        match &mut self.labeler {
+            Labeler::Content(content) => content.start_slab(),
+            Labeler::Uniform(_) => {}
+            Labeler::Temporal(temporal) => temporal.start_slab(),
+        }
     }
 
     /// The labels of the next frame, a new slab started where it shows another scene.
@@ -116,10 +121,10 @@ impl Segmenter {
     pub fn push(&mut self, frame: &Frame) -> LabelPlane {
         assert_eq!(Raster::new(frame.width(), frame.height()), self.raster, "frame size");
         self.view = Some(SceneView::new(frame));
-        match self.params.superpixels {
-            0 => self.content.push(frame),
-            1 => self.uniform.clone(),
-            _ => self.temporal.push(frame),
+        match &mut self.labeler {
+            Labeler::Content(content) => content.push(frame),
+            Labeler::Uniform(plane) => plane.clone(),
+            Labeler::Temporal(temporal) => temporal.push(frame),
         }
     }
 }

@@ -57,10 +57,11 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         let total = self.absorb_all(blocks, &mut glued, params.spread_weight);
         let total = SimplifyReport { vertices_in_window: self.vertices.len() - first_vertex, ..total };
         // The blocks have the surfaces of all vertices but those that are shared.
-        let shared = run.positions.iter().zip(&surfaces).zip(&numbers).filter(|&(_, &number)| number == SHARED);
-        for ((position, surface), _) in shared {
-            if let (Some(surface), Some(&vertex)) = (surface, glued.get(position)) {
-                self.surface_mut(vertex).add_scaled(surface, 1.0);
+        for (own, (position, _)) in
+            (0..).zip(run.positions.iter().zip(&numbers)).filter(|(_, (_, number))| **number == SHARED)
+        {
+            if let Some(&vertex) = glued.get(position) {
+                self.add_surface(vertex, surfaces.get(&own));
             }
         }
         self.vertices.iter_mut().for_each(|vertex| vertex.frozen = false);
@@ -176,7 +177,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         &mut self,
         run: &TetMesh,
         part: &Part,
-        (numbers, surfaces): (&[u32], &[Option<PositionQuadric>]),
+        (numbers, surfaces): (&[u32], &HashMap<u32, PositionQuadric>),
         params: &SimplifyParams,
     ) {
         for &vertex in &part.vertices {
@@ -192,9 +193,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         }
         self.spread(0, params.spread_weight);
         for (&vertex, number) in part.vertices.iter().zip(0..) {
-            if let Some(surface) = &surfaces[vertex as usize] {
-                self.surface_mut(number).add_scaled(surface, 1.0);
-            }
+            self.add_surface(number, surfaces.get(&vertex));
         }
     }
 
@@ -236,9 +235,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
                 self.wedge_mut(*number, own.label).quadric.add(&own.quadric);
                 wedge = block.overflow.get(own.next as usize);
             }
-            if let Some(surface) = block.surfaces.get(vertex.surface as usize) {
-                self.surface_mut(*number).add_scaled(surface, 1.0);
-            }
+            self.add_surface(*number, block.surfaces.get(vertex.surface as usize));
         }
         for (tet, label) in block.tets.into_iter().zip(block.labels).filter(|(tet, _)| tet[0] != NONE) {
             self.tets.push(tet.map(|v| numbers[v as usize]));

@@ -43,19 +43,12 @@ struct BorderPoint {
     is_junction: bool,
 }
 
-/// The quadric of each vertex of `run`, about the vertex itself, in pixels and frames.
-pub(super) fn surface_quadrics(run: &TetMesh, weight: f32) -> Vec<Option<PositionQuadric>> {
+/// The quadrics of the vertices of `run` where labels meet at a frame, each about the vertex itself, in pixels and frames.
+pub(super) fn surface_quadrics(run: &TetMesh, weight: f32) -> HashMap<u32, PositionQuadric> {
     let points = border_points(run);
-    let mut out = vec![None; run.positions.len()];
-    if points.is_empty() {
-        return out;
-    }
     let grid = Grid::new(&points);
     let quadrics = map((0..points.len()).collect(), |n| quadric(&points[n], &grid, weight));
-    for (point, quadric) in points.iter().zip(quadrics) {
-        out[point.vertex as usize] = Some(quadric);
-    }
-    out
+    points.iter().map(|point| point.vertex).zip(quadrics).collect()
 }
 
 fn border_points(run: &TetMesh) -> Vec<BorderPoint> {
@@ -200,7 +193,7 @@ mod tests {
                 }
             }
         }
-        let quadric = surface_quadrics(&run, 1.0)[60].expect("labels meet there");
+        let quadric = surface_quadrics(&run, 1.0)[&60];
         let jump = 3.0 * 100.0f32.powi(2) / POINTS_PER_PIXEL;
         let along = Vec3::new(0.5, 1.0, 0.0) * 2.0;
         assert!(quadric.at(along) < 0.02 * jump, "{}", quadric.at(along) / jump);

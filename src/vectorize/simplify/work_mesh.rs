@@ -111,11 +111,8 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
             self.add_tet(run, tet, run.tet_vertices(tet).map(|v| vertices[v.index()]));
         }
         self.spread(first_vertex, params.spread_weight);
-        for (vertex, quadric) in vertices.iter().zip(surface_quadrics(run, params.surface_weight)) {
-            if let Some(quadric) = quadric {
-                self.surface_mut(*vertex).add_scaled(&quadric, 1.0);
-            }
-        }
+        let surfaces = surface_quadrics(run, params.surface_weight);
+        (0..).zip(vertices).for_each(|(own, vertex)| self.add_surface(vertex, surfaces.get(&own)));
     }
 
     /// The vertices at time `t` (lattice units), by position.
@@ -202,6 +199,13 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     #[inline]
     pub(super) fn offset(&self, from: IVec3, to: IVec3) -> Vec3 {
         (to - from).as_vec3() / self.domain.unit() as f32
+    }
+
+    /// Adds a surface quadric, if there is one, to that of `vertex`.
+    pub(super) fn add_surface(&mut self, vertex: u32, surface: Option<&PositionQuadric>) {
+        if let Some(surface) = surface {
+            self.surface_mut(vertex).add_scaled(surface, 1.0);
+        }
     }
 
     /// The surface quadric of `vertex`, made if there is none.

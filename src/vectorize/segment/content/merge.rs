@@ -2,12 +2,12 @@
 //!
 //! In: pixels with their regions. Out: the same with fewer regions, numbered without gaps.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use glam::Vec3;
 
 use super::super::raster::Raster;
-use super::zones::{join, root};
+use super::forest::Forest;
 use super::{Pixel, Region};
 
 /// Which boundaries stay.
@@ -43,16 +43,16 @@ pub(super) struct Regions {
     pub(super) areas: Vec<u32>,
     /// Mean colour of each.
     pub(super) colors: Vec<Vec3>,
-    /// Which have a side of a pixel in common, the lower number first.
-    pub(super) neighbors: BTreeSet<(Region, Region)>,
+    /// Those that have a side of a pixel in common with each.
+    pub(super) beside: Vec<Vec<Region>>,
 }
 
 /// Joins regions.
 pub(super) fn merge(raster: Raster, pixels: &mut [Pixel], rules: MergeRules) -> Regions {
     let regions = pixels.iter().map(|pixel| pixel.region + 1).max().unwrap_or(0);
-    let mut forest: Vec<Region> = (0..regions).collect();
+    let mut forest = Forest::new(regions as usize);
     loop {
-        let (boundaries, areas) = survey(raster, pixels, &mut forest);
+        let (boundaries, areas) = survey(raster, pixels, &mut forest, regions as usize);
         // Every region's weakest boundary at once (Boruvka 1926): a survey costs more than the rest.
         let mut weakest: Vec<Option<(f32, Region)>> = vec![None; regions as usize];
         for (&(a, b), boundary) in &boundaries {
@@ -65,16 +65,16 @@ pub(super) fn merge(raster: Raster, pixels: &mut [Pixel], rules: MergeRules) -> 
                 }
             }
         }
-        let mut joined = 0;
+        if weakest.iter().all(Option::is_none) {
+            let (numbers, count) = forest.number(pixels.iter().map(|pixel| pixel.region), 0);
+            pixels.iter_mut().for_each(|pixel| pixel.region = numbers[pixel.region as usize]);
+            let pairs = boundaries.into_keys().map(|pair| [pair.0, pair.1].map(|root| numbers[root as usize]));
+            return Regions::new(pixels, count as usize, pairs);
+        }
         for (own, weakest) in (0..).zip(&weakest) {
             if let Some((_, other)) = weakest {
-                join(&mut forest, own, *other);
-                joined += 1;
+                forest.join(own, *other);
             }
-        }
-        if joined == 0 {
-            let count = renumber(pixels, &mut forest);
-            return Regions::new(raster, pixels, count as usize);
         }
     }
 }
@@ -85,15 +85,15 @@ const SMALL: f32 = 1000.0;
 type Survey = (BTreeMap<(Region, Region), Boundary>, Vec<u32>);
 
 /// The boundaries between roots, and the roots' areas.
-fn survey(raster: Raster, pixels: &[Pixel], forest: &mut [Region]) -> Survey {
+fn survey(raster: Raster, pixels: &[Pixel], forest: &mut Forest, regions: usize) -> Survey {
     let mut boundaries: BTreeMap<(Region, Region), Boundary> = BTreeMap::new();
-    let mut areas = vec![0; forest.len()];
-    pixels.iter().for_each(|pixel| areas[root(forest, pixel.region) as usize] += 1);
+    let mut areas = vec![0; regions];
+    pixels.iter().for_each(|pixel| areas[forest.root(pixel.region) as usize] += 1);
     for (p, q) in raster.side_pairs() {
         if pixels[p].region == pixels[q].region {
             continue;
         }
-        let (a, b) = (root(forest, pixels[p].region), root(forest, pixels[q].region));
+        let (a, b) = (forest.root(pixels[p].region), forest.root(pixels[q].region));
         if a == b {
             continue;
         }
@@ -107,45 +107,19 @@ fn survey(raster: Raster, pixels: &[Pixel], forest: &mut [Region]) -> Survey {
 }
 
 impl Regions {
-    fn new(raster: Raster, pixels: &[Pixel], count: usize) -> Self {
-        let mut regions = Self { areas: vec![0; count], colors: vec![Vec3::ZERO; count], neighbors: BTreeSet::new() };
+    /// Of `count` regions, given which lie beside each other.
+    fn new(pixels: &[Pixel], count: usize, pairs: impl Iterator<Item = [Region; 2]>) -> Self {
+        let mut regions =
+            Self { areas: vec![0; count], colors: vec![Vec3::ZERO; count], beside: vec![Vec::new(); count] };
         for pixel in pixels {
             regions.areas[pixel.region as usize] += 1;
             regions.colors[pixel.region as usize] += pixel.color;
         }
         regions.colors.iter_mut().zip(&regions.areas).for_each(|(color, &area)| *color /= area.max(1) as f32);
-        for (p, q) in raster.side_pairs() {
-            let (a, b) = (pixels[p].region, pixels[q].region);
-            if a != b {
-                regions.neighbors.insert((a.min(b), a.max(b)));
-            }
+        for [a, b] in pairs {
+            regions.beside[a as usize].push(b);
+            regions.beside[b as usize].push(a);
         }
         regions
     }
-
-    /// The regions beside `region`.
-    pub(super) fn beside(&self, region: Region) -> impl Iterator<Item = Region> + '_ {
-        let other = move |&(a, b): &(Region, Region)| match region {
-            r if r == a => Some(b),
-            r if r == b => Some(a),
-            _ => None,
-        };
-        self.neighbors.iter().filter_map(other)
-    }
-}
-
-fn renumber(pixels: &mut [Pixel], forest: &mut [Region]) -> u32 {
-    let mut names = vec![u32::MAX; forest.len()];
-    let mut count = 0;
-    for pixel in pixels.iter() {
-        let name = &mut names[root(forest, pixel.region) as usize];
-        if *name == u32::MAX {
-            *name = count;
-            count += 1;
-        }
-    }
-    for pixel in pixels {
-        pixel.region = names[root(forest, pixel.region) as usize];
-    }
-    count
 }

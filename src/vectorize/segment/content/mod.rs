@@ -1,10 +1,10 @@
 //! Labels by content: a discontinuity only where the picture jumps.
 //!
-//! In: frames of a slab, in order. Out: a label for every pixel. `zones` are
-//! what has one colour or changes it slowly; `unmix` takes every other pixel for a blend of what lies around it, or
-//! for a stroke too thin to have a pixel of its own; `merge` gives up boundaries that are weak, and `naming` gives
-//! labels to regions such that they last.
+//! In: frames of a slab, in order. Out: a label for every pixel. `zones` are what has one colour or changes it slowly;
+//! `unmix` takes every other pixel for a blend of what lies around it, or for a stroke too thin to have a pixel of its
+//! own; `merge` gives up boundaries that are weak, and `naming` gives labels to regions such that they last.
 
+mod forest;
 mod merge;
 mod naming;
 mod unmix;
@@ -48,9 +48,15 @@ pub(super) struct Content {
 }
 
 impl Content {
-    /// Starts a slab.
+    /// For frames of this size, at the start of a slab.
     pub(super) fn new(raster: Raster, params: SegmentParams) -> Self {
         Self { raster, params, before: None, palette: Palette::default() }
+    }
+
+    /// Forgets everything: the next frame starts afresh, from label 0.
+    pub(super) fn start_slab(&mut self) {
+        self.before = None;
+        self.palette = Palette::default();
     }
 
     /// The labels of the next frame.

@@ -1,7 +1,8 @@
 //! Labels for regions, such that what was there in the frame before keeps its label.
 //!
 //! In: a frame's regions, and the frame before with its labels. Out: a label for each region. A region takes the label
-//! that most of its pixels had where they come from, if no other region has more of it.
+//! that most of its pixels had where they come from, or else one that looks like it, unless a larger region beside it has
+//! that label.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,7 +15,7 @@ use super::merge::Regions;
 use crate::video::{Frame, LabelPlane};
 
 /// Most that a channel may differ from where a pixel comes from, in levels, to vote.
-const ALIKE: i32 = 30;
+const ALIKE: u8 = 30;
 
 /// The frame before.
 pub(super) struct Before<'a> {
@@ -45,7 +46,8 @@ impl Palette {
         order.sort_by_key(|&region| std::cmp::Reverse(regions.areas[region as usize]));
         let mut names = vec![NONE; order.len()];
         for region in order {
-            let taken: BTreeSet<u32> = regions.beside(region).map(|other| names[other as usize]).collect();
+            let taken: BTreeSet<u32> =
+                regions.beside[region as usize].iter().map(|&other| names[other as usize]).collect();
             let color = regions.colors[region as usize];
             let mut voted: Vec<(u32, u32)> =
                 votes.range((region, 0)..=(region, NONE)).map(|(&(_, label), &n)| (n, label)).collect();
@@ -97,12 +99,9 @@ impl Before<'_> {
     fn label(&self, raster: Raster, frame: &Frame, p: usize) -> Option<u32> {
         let (x, y) = raster.xy(p);
         let [dx, dy] = self.motion.clamped((x / BLOCK) as isize, (y / BLOCK) as isize);
-        let (qx, qy) = (x as i32 + dx, y as i32 + dy);
-        if !(0..raster.width as i32).contains(&qx) || !(0..raster.height as i32).contains(&qy) {
-            return None;
-        }
-        let (here, there) = (frame.row(y as u32)[x], self.frame.row(qy as u32)[qx as usize]);
-        let is_alike = (0..3).all(|c| (i32::from(here[c]) - i32::from(there[c])).abs() <= ALIKE);
-        is_alike.then(|| self.labels.label(qx as u32, qy as u32).0)
+        let q = raster.index(x as i64 + i64::from(dx), y as i64 + i64::from(dy))?;
+        let (here, there) = (frame.pixels()[p], self.frame.pixels()[q]);
+        let is_alike = here.iter().zip(there).all(|(here, there)| here.abs_diff(there) <= ALIKE);
+        is_alike.then(|| self.labels.labels()[q].0)
     }
 }

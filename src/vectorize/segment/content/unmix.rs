@@ -1,13 +1,14 @@
-//! Blended pixels: which regions share each, and in which parts.
+//! Blended pixels: which region has most of each.
 //!
-//! In: a frame and its zones. Out: every pixel's region, and the region's colour there. A pixel at an edge is
-//! the mean of what covers it; so the best blend of two regions nearby tells which of them has more of it. What no
-//! blend explains is a stroke too thin to be pure anywhere, or texture: a region of its own.
+//! In: a frame and its zones. Out: every pixel's region, and the region's colour there. A pixel at an edge is the mean of
+//! what covers it; so the best blend of two regions nearby tells which of them has more of it. What no blend explains is a
+//! stroke too thin to be pure anywhere, or texture: a region of its own.
 
 use glam::Vec3;
 
 use super::super::raster::Raster;
-use super::zones::{IMPURE, Zones, join, root};
+use super::forest::Forest;
+use super::zones::{IMPURE, Zones};
 use super::{Pixel, Region};
 use crate::video::Frame;
 
@@ -26,16 +27,47 @@ const STROKE_PART: f32 = 0.4;
 struct Candidate {
     region: Region,
     color: Vec3,
-    weight: f32,
 }
 
-/// The best account of a pixel.
+/// An account of a pixel.
 #[derive(Debug, Clone, Copy)]
 struct Blend {
     major: Candidate,
     minor: Candidate,
+    /// Which part of the pixel the major one has.
     part: f32,
     error: f32,
+}
+
+impl Blend {
+    /// One candidate alone.
+    fn of_one(color: Vec3, candidate: Candidate) -> Self {
+        let error = color.distance_squared(candidate.color);
+        Self { major: candidate, minor: candidate, part: 1.0, error }
+    }
+
+    /// Two in the parts that come closest to `color`; from the part `majority` on the pixel is the first one's.
+    fn of_two(color: Vec3, first: Candidate, second: Candidate, majority: f32) -> Self {
+        let along = first.color - second.color;
+        let part = ((color - second.color).dot(along) / along.length_squared().max(1.0)).clamp(0.0, 1.0);
+        let error = color.distance_squared(second.color.lerp(first.color, part));
+        if part >= majority {
+            Self { major: first, minor: second, part, error }
+        } else {
+            Self { major: second, minor: first, part: 1.0 - part, error }
+        }
+    }
+
+    /// The better of two accounts, of equals the one that was there.
+    fn or_better(before: Option<Self>, other: Self) -> Option<Self> {
+        Some(before.filter(|before| before.error <= other.error).unwrap_or(other))
+    }
+
+    /// The pixel of this colour that it accounts for.
+    fn pixel(&self, color: Vec3) -> Pixel {
+        let alone = self.major.region == self.minor.region || self.part > WHOLE;
+        Pixel { region: self.major.region, color: if alone { color } else { self.major.color } }
+    }
 }
 
 /// Takes every pixel apart.
@@ -59,44 +91,28 @@ pub(super) fn unmix(raster: Raster, frame: &Frame, zones: &Zones) -> Vec<Pixel> 
 
 /// The zones around a pixel, nearer pixels counting more.
 fn candidates(raster: Raster, colors: &[Vec3], zones: &Zones, p: usize) -> Vec<Candidate> {
-    let mut found: Vec<Candidate> = Vec::new();
+    let mut found: Vec<(Region, Vec3, f32)> = Vec::new();
     around(raster, p, REACH, |q, distance2| {
         let region = zones.of_pixel[q];
         if region == IMPURE {
             return;
         }
         let weight = 1.0 / (distance2 * distance2) as f32;
-        match found.iter_mut().find(|candidate| candidate.region == region) {
-            Some(candidate) => {
-                candidate.color += colors[q] * weight;
-                candidate.weight += weight;
-            }
-            None => found.push(Candidate { region, color: colors[q] * weight, weight }),
+        match found.iter_mut().find(|(known, ..)| *known == region) {
+            Some((_, sum, total)) => (*sum, *total) = (*sum + colors[q] * weight, *total + weight),
+            None => found.push((region, colors[q] * weight, weight)),
         }
     });
-    found.iter_mut().for_each(|candidate| candidate.color /= candidate.weight);
-    found
+    found.into_iter().map(|(region, sum, total)| Candidate { region, color: sum / total }).collect()
 }
 
 /// The one or two candidates that a colour is the best blend of.
 fn best_blend(color: Vec3, candidates: &[Candidate]) -> Option<Blend> {
-    let mut best: Option<Blend> = None;
-    let mut offer = |major: Candidate, minor: Candidate, part: f32| {
-        let error = color.distance_squared(minor.color.lerp(major.color, part));
-        if best.is_none_or(|best| error < best.error) {
-            best = Some(if part >= 0.5 {
-                Blend { major, minor, part, error }
-            } else {
-                Blend { major: minor, minor: major, part: 1.0 - part, error }
-            });
-        }
-    };
+    let mut best = None;
     for (n, &a) in candidates.iter().enumerate() {
-        offer(a, a, 1.0);
+        best = Blend::or_better(best, Blend::of_one(color, a));
         for &b in &candidates[n + 1..] {
-            let along = a.color - b.color;
-            let part = (color - b.color).dot(along) / along.length_squared().max(1.0);
-            offer(a, b, part.clamp(0.0, 1.0));
+            best = Blend::or_better(best, Blend::of_two(color, a, b, 0.5));
         }
     }
     best
@@ -118,25 +134,16 @@ impl Strokes {
             _ => 0.0,
         };
         let strangeness: Vec<f32> = (0..raster.len()).map(error).collect();
-        let mut forest: Vec<u32> = (0..raster.len() as u32).collect();
-        for p in (0..raster.len()).filter(|&p| strangeness[p] > RESIDUE) {
+        let strange = || (0..raster.len()).filter(|&p| strangeness[p] > RESIDUE);
+        let mut forest = Forest::new(raster.len());
+        for p in strange() {
             around(raster, p, 1, |q, _| {
                 if q < p && strangeness[q] > RESIDUE && is_alike(colors[p], colors[q]) {
-                    join(&mut forest, p as u32, q as u32);
+                    forest.join(p as u32, q as u32);
                 }
             });
         }
-        let mut names = vec![IMPURE; raster.len()];
-        let mut next = zones.count;
-        let mut of_pixel = vec![IMPURE; raster.len()];
-        for p in (0..raster.len()).filter(|&p| strangeness[p] > RESIDUE) {
-            let root = root(&mut forest, p as u32) as usize;
-            if names[root] == IMPURE {
-                names[root] = next;
-                next += 1;
-            }
-            of_pixel[p] = names[root];
-        }
+        let (of_pixel, _) = forest.number(strange().map(|p| p as u32), zones.count);
         Self { of_pixel, strangeness }
     }
 
@@ -149,45 +156,19 @@ impl Strokes {
                 strangest = Some(q);
             }
         });
-        let own = self.of_pixel[p];
-        let stroke = match strangest {
-            _ if own != IMPURE && zones.is_empty() => p,
-            Some(q) if own == IMPURE || self.strangeness[q] > self.strangeness[p] => q,
-            _ if own != IMPURE => p,
-            Some(q) => q,
-            None => return pixel_of(blend.unwrap_or_else(|| lone(colors[p])), colors[p]),
+        let (own, color) = (self.of_pixel[p], colors[p]);
+        let is_purer = |q: &usize| own == IMPURE || (!zones.is_empty() && self.strangeness[*q] > self.strangeness[p]);
+        // A pixel of a stroke is at worst the purest itself; any other without a stroke nearby has a blend.
+        let Some(purest) = strangest.filter(is_purer).or((own != IMPURE).then_some(p)) else {
+            return blend.map_or(Pixel { region: 0, color }, |blend| blend.pixel(color));
         };
-        let region = if own == IMPURE { self.of_pixel[stroke] } else { own };
-        let stroke = Candidate { region, color: colors[stroke], weight: 1.0 };
-        let mut best = blend.filter(|blend| blend.error <= RESIDUE);
-        let mut offer = |blend: Blend| {
-            if best.is_none_or(|best| blend.error < best.error) {
-                best = Some(blend);
-            }
-        };
-        for &zone in zones {
-            let along = stroke.color - zone.color;
-            let part = ((colors[p] - zone.color).dot(along) / along.length_squared().max(1.0)).clamp(0.0, 1.0);
-            let error = colors[p].distance_squared(zone.color.lerp(stroke.color, part));
-            offer(if part >= STROKE_PART {
-                Blend { major: stroke, minor: zone, part, error }
-            } else {
-                Blend { major: zone, minor: stroke, part: 1.0 - part, error }
-            });
-        }
-        pixel_of(best.unwrap_or(Blend { major: stroke, minor: stroke, part: 1.0, error: 0.0 }), colors[p])
+        let region = if own == IMPURE { self.of_pixel[purest] } else { own };
+        let stroke = Candidate { region, color: colors[purest] };
+        let explained = blend.filter(|blend| blend.error <= RESIDUE);
+        let with_stroke = zones.iter().map(|&zone| Blend::of_two(color, stroke, zone, STROKE_PART));
+        let best = with_stroke.fold(explained, Blend::or_better);
+        best.unwrap_or(Blend::of_one(color, stroke)).pixel(color)
     }
-}
-
-/// A pixel that has nothing around it that it could be of.
-fn lone(color: Vec3) -> Blend {
-    let alone = Candidate { region: 0, color, weight: 1.0 };
-    Blend { major: alone, minor: alone, part: 1.0, error: 0.0 }
-}
-
-fn pixel_of(Blend { major, minor, part, .. }: Blend, color: Vec3) -> Pixel {
-    let alone = major.region == minor.region || part > WHOLE;
-    Pixel { region: major.region, color: if alone { color } else { major.color } }
 }
 
 /// Part of a pixel from which on it is taken for its region's alone.
@@ -203,10 +184,9 @@ fn around(raster: Raster, p: usize, reach: isize, mut found: impl FnMut(usize, i
     let (x, y) = raster.xy(p);
     for dy in -reach..=reach {
         for dx in -reach..=reach {
-            let (qx, qy) = (x as isize + dx, y as isize + dy);
-            let is_inside = (0..raster.width as isize).contains(&qx) && (0..raster.height as isize).contains(&qy);
-            if is_inside && (dx, dy) != (0, 0) {
-                found(qy as usize * raster.width + qx as usize, dx * dx + dy * dy);
+            let q = raster.index((x as isize + dx) as i64, (y as isize + dy) as i64);
+            if let Some(q) = q.filter(|&q| q != p) {
+                found(q, dx * dx + dy * dy);
             }
         }
     }

@@ -3,10 +3,11 @@
 //! In: a frame. Out: for every pixel the zone that it is purely of, if it is of one.
 
 use super::super::raster::Raster;
+use super::forest::{Forest, NONE};
 use crate::video::Frame;
 
 /// No zone.
-pub(super) const IMPURE: u32 = u32::MAX;
+pub(super) const IMPURE: u32 = NONE;
 
 /// Most that a channel may differ within two by two pixels of one zone, in levels: in the cleanest picture, where faint
 /// edges are seen, and in any, since an edge of 60 levels blurred over three pixels must be steeper.
@@ -14,7 +15,7 @@ const RANGE: std::ops::RangeInclusive<usize> = 6..=18;
 /// Which part of a picture's blocks decide what is clean, and how many times as much as within them is allowed.
 const CLEAN_PART: f32 = 0.5;
 const CLEAN_TIMES: usize = 3;
-/// Fewest pixels of a zone.
+/// Fewest pixels of a zone: more than a block has.
 const LEAST_PIXELS: u32 = 6;
 
 /// The zones of a frame.
@@ -29,22 +30,23 @@ pub(super) struct Zones {
 /// Finds the zones: pixels of uniform two by two blocks, joined where blocks overlap.
 pub(super) fn find_zones(raster: Raster, frame: &Frame) -> Zones {
     let Raster { width, height } = raster;
-    let mut forest: Vec<u32> = (0..raster.len() as u32).collect();
-    let mut pure = vec![false; raster.len()];
+    let mut forest = Forest::new(raster.len());
     let allowed = allowed_range(raster, frame);
     for y in 0..height.saturating_sub(1) {
         let (upper, lower) = (frame.row(y as u32), frame.row(y as u32 + 1));
         for x in 0..width.saturating_sub(1) {
             if range_of([upper[x], upper[x + 1], lower[x], lower[x + 1]]) <= allowed {
                 let p = y * width + x;
-                for q in [p, p + 1, p + width, p + width + 1] {
-                    pure[q] = true;
-                    join(&mut forest, p as u32, q as u32);
-                }
+                [p + 1, p + width, p + width + 1].into_iter().for_each(|q| forest.join(p as u32, q as u32));
             }
         }
     }
-    number(&mut forest, &pure)
+    let mut areas = vec![0u32; raster.len()];
+    (0..raster.len() as u32).for_each(|p| areas[forest.root(p) as usize] += 1);
+    let large: Vec<u32> =
+        (0..raster.len() as u32).filter(|&p| areas[forest.root(p) as usize] >= LEAST_PIXELS).collect();
+    let (of_pixel, count) = forest.number(large.into_iter(), 0);
+    Zones { of_pixel, count }
 }
 
 impl Zones {
@@ -89,43 +91,4 @@ fn range_of(pixels: [[u8; 3]; 4]) -> u8 {
         high - low
     };
     range(0).max(range(1)).max(range(2))
-}
-
-fn number(forest: &mut [u32], pure: &[bool]) -> Zones {
-    let mut area = vec![0u32; forest.len()];
-    for p in 0..forest.len() {
-        if pure[p] {
-            area[root(forest, p as u32) as usize] += 1;
-        }
-    }
-    let mut names = vec![IMPURE; forest.len()];
-    let mut count = 0;
-    let mut of_pixel = vec![IMPURE; forest.len()];
-    for p in 0..forest.len() {
-        let root = root(forest, p as u32) as usize;
-        if pure[p] && area[root] >= LEAST_PIXELS {
-            if names[root] == IMPURE {
-                names[root] = count;
-                count += 1;
-            }
-            of_pixel[p] = names[root];
-        }
-    }
-    Zones { of_pixel, count }
-}
-
-/// The root of an item's tree, whose paths are halved on the way.
-pub(super) fn root(forest: &mut [u32], mut item: u32) -> u32 {
-    while forest[item as usize] != item {
-        forest[item as usize] = forest[forest[item as usize] as usize];
-        item = forest[item as usize];
-    }
-    item
-}
-
-/// Joins two trees under the lower root.
-pub(super) fn join(forest: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (root(forest, a), root(forest, b));
-    let (low, high) = (a.min(b), a.max(b));
-    forest[high as usize] = low;
 }
