@@ -1,8 +1,11 @@
 //! One clip through encoder and decoder, in figures: `measure frame*.png --preset fast`, or `measure in.y4m`.
 //!
-//! Prints one line: wall clock a frame, in all and by stage, collapses a second of the simplification, peak memory, simplification ratio, bytes, error against the
-//! source, and how long decoding and drawing at the source's size take. `scripts/bench.sh` compares settings with it.
+//! Prints one line: seconds a frame by the wall, in all and by stage, and behind a slash what all threads worked together;
+//! collapses a second of the simplification's work, peak memory, simplification ratio, bytes, error against the source,
+//! and how long decoding and drawing at the source's size take. `scripts/bench.sh` compares settings with it.
 
+#[path = "measure/clock.rs"]
+mod clock;
 #[path = "vectorize/settings.rs"]
 mod settings;
 #[path = "vectorize/source.rs"]
@@ -16,6 +19,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use clap::Parser;
+use clock::{Clock, Spent};
 use settings::Settings;
 use tetvec::metrics::{Difference, simplification_ratio};
 use tetvec::{Decoder, DecoderConfig, Encoder, EncoderConfig, Event, Frame, Packet, Stage, Surface};
@@ -59,14 +63,15 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let (error, decoding) = decode(&frames, &encoded.packets)?;
     let bytes: usize = encoded.packets.iter().map(|packet| packet.data.len()).sum();
     let vertices = encoded.vertices;
-    print!("{:.3} s/frame", encoded.time.as_secs_f64() / count);
+    let print_spent = |name: &str, Spent { wall, work }| {
+        print!("{name} {:.3}/{:.3}", wall.as_secs_f64() / count, work.as_secs_f64() / count);
+    };
+    print_spent("s/frame", encoded.time);
     for stage in Stage::ALL {
-        let time = encoded.stages.get(&stage).copied().unwrap_or_default();
-        print!(" {} {:.3}", stage.name(), time.as_secs_f64() / count);
+        print_spent(&format!(" {}", stage.name()), encoded.of(stage));
     }
-    let simplified = encoded.stages.get(&Stage::Simplify).map_or(1.0, Duration::as_secs_f64);
     let (collapses, evaluations) = encoded.collapses;
-    print!(" | {:.0} k collapses/s", collapses as f64 / simplified / 1e3);
+    print!(" | {:.0} k collapses/s", collapses as f64 / encoded.of(Stage::Simplify).work.as_secs_f64() / 1e3);
     print!(" of {:.1} evaluations", evaluations as f64 / collapses.max(1) as f64);
     if let (Some(before), Some(memory)) = (before, memory) {
         print!(" | {:.0} MB, {:.0} MB without the source", memory, memory - before);
@@ -82,22 +87,28 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 struct Encoded {
     packets: Vec<Packet>,
     vertices: u64,
-    time: Duration,
-    stages: HashMap<Stage, Duration>,
+    time: Spent,
+    stages: HashMap<Stage, Spent>,
     /// Edges collapsed, and costs computed for that.
     collapses: (u64, u64),
 }
 
+impl Encoded {
+    fn of(&self, stage: Stage) -> Spent {
+        self.stages.get(&stage).copied().unwrap_or_default()
+    }
+}
+
 fn encode(frames: &[Frame], config: EncoderConfig) -> Result<Encoded, Box<dyn Error>> {
     let mut encoder = Encoder::try_new(config)?;
-    let figures = Arc::new(Mutex::new((HashMap::new(), (0, 0))));
+    let figures = Arc::new(Mutex::new((HashMap::<Stage, Spent>::new(), (0, 0))));
     let mut began = None;
     let noted = figures.clone();
     encoder.observe(move |event| match event {
-        Event::Began(stage) => began = Some((stage, Instant::now())),
+        Event::Began(stage) => began = Some((stage, Clock::start())),
         Event::Ended => {
-            if let (Some((stage, start)), Ok(mut figures)) = (began.take(), noted.lock()) {
-                *figures.0.entry(stage).or_default() += start.elapsed();
+            if let (Some((stage, clock)), Ok(mut figures)) = (began.take(), noted.lock()) {
+                *figures.0.entry(stage).or_default() += clock.spent();
             }
         }
         Event::Simplified(report) => {
@@ -109,14 +120,14 @@ fn encode(frames: &[Frame], config: EncoderConfig) -> Result<Encoded, Box<dyn Er
         Event::Fitted(_) => {}
     });
     let mut packets = Vec::new();
-    let start = Instant::now();
+    let clock = Clock::start();
     for frame in frames {
         encoder.send_frame(frame.clone(), false)?;
         packets.extend(std::iter::from_fn(|| encoder.receive_packet()));
     }
     encoder.finish()?;
     packets.extend(std::iter::from_fn(|| encoder.receive_packet()));
-    let time = start.elapsed();
+    let time = clock.spent();
     let (stages, collapses) = figures.lock().map_err(|error| error.to_string())?.clone();
     Ok(Encoded { packets, vertices: encoder.vertices(), time, stages, collapses })
 }

@@ -31,7 +31,7 @@ pair() {
     for _ in 1 2 3; do
         for n in 0 1; do
             if [ "$n" = 0 ]; then line=$(run "${first[@]}"); else line=$(run "${second[@]}"); fi
-            best[n]=$(awk -v a="${best[$n]}" -v b="${line%% *}" 'BEGIN { print (b < a ? b : a) }')
+            best[n]=$(awk -v a="${best[$n]}" -v b="$(awk "{ print \$2 + 0 }" <<<"$line")" 'BEGIN { print (b < a ? b : a) }')
         done
     done
     awk -v name="$name" -v a="${best[0]}" -v b="${best[1]}" \
