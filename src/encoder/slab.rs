@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::observer::{Event, Observer, Stage};
 use super::readiness::{FAR, hops};
 use super::runs::{Run, Runs};
-use super::{EncodeError, EncoderConfig};
+use super::{EncodeError, EncoderConfig, ErrorMetric};
 use crate::bitstream::{Packet, RINGS, SlabWriter};
 use crate::mesh::{Domain, StarTable, TetMesh};
 use crate::vectorize::fit::{FitParams, FitReport, FitRequest, fit};
@@ -134,6 +134,11 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             simplify_params: SimplifyParams {
                 max_extent_frames: config.window,
                 topology: config.topology,
+                // Made of colour errors, so no measure for distances.
+                surface_weight: match config.error_metric {
+                    ErrorMetric::Color => SimplifyParams::default().surface_weight,
+                    ErrorMetric::Paper => 0.0,
+                },
                 ..SimplifyParams::default()
             },
             fit_params: FitParams {

@@ -3,7 +3,7 @@
 use glam::{IVec3, Vec3};
 
 use super::SimplifyParams;
-use super::legality::{Limits, Refusal, RefusalCounts, Topology};
+use super::legality::{Limits, Marks, Refusal, RefusalCounts, Topology};
 use super::quadric::{PositionQuadric, WedgeQuadric};
 use super::queue::{BucketQueue, Entry};
 use super::stars::Stars;
@@ -104,6 +104,8 @@ struct Simplifier<'a, Q> {
     known_bits: u32,
     report: SimplifyReport,
     star: Vec<u32>,
+    /// For the link condition.
+    marks: Marks,
 }
 
 /// Collapses edges of `mesh` in the order of their cost until `goal` is reached or nothing more is allowed.
@@ -133,8 +135,9 @@ pub fn simplify<Q: WedgeQuadric>(
     mesh.stars = Stars::new(mesh.vertices.len(), &mesh.tets);
     mesh.places = mesh.vertices.iter().map(|vertex| vertex.position).collect();
     let known_bits = (mesh.vertices.len() as u32 | 1).ilog2().clamp(4, KNOWN_BITS);
+    let vertices = mesh.vertices.len();
     let mut run = Simplifier {
-        alias: (0..mesh.vertices.len() as u32).collect(),
+        alias: (0..vertices as u32).collect(),
         mesh,
         unfrozen,
         goal,
@@ -146,6 +149,7 @@ pub fn simplify<Q: WedgeQuadric>(
         known_bits,
         report,
         star: Vec::new(),
+        marks: Marks::new(if params.topology == Topology::Strict { vertices } else { 0 }),
     };
     run.rank_edges();
     run.collapse();
@@ -271,7 +275,8 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
 
     fn try_collapse(&mut self, bucket: usize, entry: Entry, proposal: Proposal) {
         let (u, v) = (entry.u, entry.v);
-        let link = if self.params.topology == Topology::Strict { self.mesh.check_link(u, v) } else { Ok(()) };
+        let link =
+            if self.params.topology == Topology::Strict { self.mesh.check_link(u, v, &mut self.marks) } else { Ok(()) };
         match link.and_then(|()| self.mesh.check_geometry([u, v], proposal.position, &self.limits)) {
             Ok(()) => self.perform(u, v, proposal),
             Err(refusal) => {

@@ -5,6 +5,7 @@ use glam::IVec3;
 use super::quadric::WedgeQuadric;
 use super::work_mesh::WorkMesh;
 use crate::mesh::volume6;
+use crate::video::Label;
 
 /// Why a collapse was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -168,34 +169,61 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         if !includes(upper, lower) {
             return Err(Refusal::Labels);
         }
-        let around = self.labels_around(u, v);
-        if self.wedges(lower).all(|wedge| around.contains(&wedge.label)) { Ok(()) } else { Err(Refusal::Labels) }
+        // All tets around a vertex of one label have that label, the edge's too.
+        let is_inside = self.wedges(lower).count() == 1;
+        let is_along = || self.wedges(lower).all(|wedge| self.is_around(u, v, wedge.label));
+        if is_inside || is_along() { Ok(()) } else { Err(Refusal::Labels) }
     }
 
-    fn labels_around(&self, u: u32, v: u32) -> Vec<crate::video::Label> {
+    /// Whether one of the tets around an edge has this label.
+    fn is_around(&self, u: u32, v: u32, label: Label) -> bool {
         let shared = self.stars.star(u).iter().filter(|&&t| self.tets[t as usize].contains(&v));
-        shared.map(|&t| self.labels[t as usize]).collect()
+        shared.into_iter().any(|&t| self.labels[t as usize] == label)
     }
 
     /// The link condition: a vertex next to both ends must share a tet with them. Dey, Edelsbrunner, Guha, Nekhayev,
     /// "Topology preserving edge contraction", 1999.
-    pub(super) fn check_link(&self, u: u32, v: u32) -> Result<(), Refusal> {
-        let neighbors = |w: u32| {
-            let mut list: Vec<u32> =
-                self.stars.star(w).iter().flat_map(|&t| self.tets[t as usize]).filter(|&x| x != w).collect();
-            list.sort_unstable();
-            list.dedup();
-            list
-        };
-        let of_v = neighbors(v);
-        let shared: Vec<[u32; 4]> =
-            self.stars.star(u).iter().map(|&t| self.tets[t as usize]).filter(|tet| tet.contains(&v)).collect();
-        let common = neighbors(u).into_iter().filter(|w| *w != v && of_v.binary_search(w).is_ok());
-        for w in common {
-            if !shared.iter().any(|tet| tet.contains(&w)) {
-                return Err(Refusal::Link);
-            }
+    pub(super) fn check_link(&self, u: u32, v: u32, marks: &mut Marks) -> Result<(), Refusal> {
+        let (near, shared) = marks.two();
+        let tets = |of: u32| self.stars.star(of).iter().map(|&t| self.tets[t as usize]);
+        for tet in tets(v) {
+            tet.into_iter().for_each(|w| marks.set(w, near));
         }
-        Ok(())
+        for tet in tets(v).filter(|tet| tet.contains(&u)) {
+            tet.into_iter().for_each(|w| marks.set(w, shared));
+        }
+        let is_apart = |w: u32| w != v && marks.has(w, near);
+        if tets(u).flatten().any(is_apart) { Err(Refusal::Link) } else { Ok(()) }
+    }
+}
+
+/// Marks on vertices that need no clearing.
+#[derive(Debug, Default)]
+pub(super) struct Marks {
+    of: Vec<u32>,
+    last: u32,
+}
+
+impl Marks {
+    pub(super) fn new(vertices: usize) -> Self {
+        Self { of: vec![0; vertices], last: 0 }
+    }
+
+    /// Two marks that no vertex has.
+    fn two(&mut self) -> (u32, u32) {
+        if self.last > u32::MAX - 2 {
+            self.of.fill(0);
+            self.last = 0;
+        }
+        self.last += 2;
+        (self.last - 1, self.last)
+    }
+
+    fn set(&mut self, vertex: u32, mark: u32) {
+        self.of[vertex as usize] = mark;
+    }
+
+    fn has(&self, vertex: u32, mark: u32) -> bool {
+        self.of[vertex as usize] == mark
     }
 }
