@@ -37,6 +37,9 @@ pub(crate) struct Settings {
     /// Steps of the position optimisation.
     #[arg(long)]
     position_steps: Option<u32>,
+    /// Fits on the way to the simplification ratio.
+    #[arg(long)]
+    refits: Option<u32>,
     /// Use the paper's error metric.
     #[arg(long)]
     paper_metric: bool,
@@ -86,6 +89,7 @@ impl Settings {
             lattice: lattice.unwrap_or(base.lattice),
             lattice_density: self.lattice_density.unwrap_or(base.lattice_density),
             position_steps: self.position_steps.unwrap_or(base.position_steps),
+            refits: self.refits.unwrap_or(base.refits),
             error_metric: if self.paper_metric { ErrorMetric::Paper } else { base.error_metric },
             topology: if self.strict { Topology::Strict } else { base.topology },
             threads: self.threads,

@@ -77,6 +77,9 @@ pub struct EncoderConfig {
     pub topology: Topology,
     /// Steps of the position optimisation, [`Self::POSITION_STEPS`]; 0: positions stay where edges collapsed to.
     pub position_steps: u32,
+    /// Fits on the way to the simplification ratio, [`Self::REFITS`]: each lets simplification start anew from a mesh that
+    /// is closer to the frames. Where the window is shorter than a slab, or `target_error` decides, there are none.
+    pub refits: u32,
     /// Worker threads; 0: all cores. Bytes do not depend on it.
     pub threads: usize,
 }
@@ -96,6 +99,8 @@ impl EncoderConfig {
     pub const LATTICE_DENSITY: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
     /// Range of `position_steps`.
     pub const POSITION_STEPS: std::ops::RangeInclusive<u32> = 0..=100;
+    /// Range of `refits`.
+    pub const REFITS: std::ops::RangeInclusive<u32> = 0..=8;
     /// Range of `subdivision_levels`.
     pub const SUBDIVISION_LEVELS: std::ops::RangeInclusive<u8> = 0..=2;
 
@@ -117,6 +122,7 @@ impl EncoderConfig {
             lattice_density: 12.0,
             topology: Topology::Free,
             position_steps: 12,
+            refits: 2,
             threads: 0,
         }
     }
@@ -134,12 +140,13 @@ impl EncoderConfig {
             lattice_density: medium.lattice_density,
             topology: medium.topology,
             position_steps: medium.position_steps,
+            refits: medium.refits,
             ..self
         };
         match preset {
-            SpeedPreset::Fast => Self { window: 10, lattice_density: 3.0, position_steps: 0, ..base },
+            SpeedPreset::Fast => Self { window: 10, lattice_density: 3.0, position_steps: 0, refits: 0, ..base },
             SpeedPreset::Medium => base,
-            SpeedPreset::Slow => Self { lattice_density: 24.0, position_steps: 24, ..base },
+            SpeedPreset::Slow => Self { lattice_density: 24.0, position_steps: 24, refits: 4, ..base },
             SpeedPreset::Paper => Self {
                 window: 10,
                 superpixels: 0,
@@ -148,6 +155,7 @@ impl EncoderConfig {
                 lattice: LatticeKind::Dense,
                 topology: Topology::Strict,
                 position_steps: 0,
+                refits: 0,
                 ..base
             },
         }
@@ -175,6 +183,7 @@ impl EncoderConfig {
             return Err(setting("lattice_density", &Self::LATTICE_DENSITY, self.lattice_density));
         }
         in_range("position_steps", self.position_steps, Self::POSITION_STEPS)?;
+        in_range("refits", self.refits, Self::REFITS)?;
         if self.frames_within_limits() == 0 {
             let found = format!("{} at {}x{}", self.simplification_ratio, self.width, self.height);
             return Err(setting("simplification_ratio x width x height", &(0..=Limits::default().max_vertices), found));
@@ -291,6 +300,7 @@ mod tests {
         assert_eq!(field(EncoderConfig { target_error: -1.0, ..good.clone() }), "target_error");
         assert_eq!(field(EncoderConfig { lattice_density: 0.5, ..good.clone() }), "lattice_density");
         assert_eq!(field(EncoderConfig { position_steps: 101, ..good.clone() }), "position_steps");
+        assert_eq!(field(EncoderConfig { refits: 9, ..good.clone() }), "refits");
         assert_eq!(field(EncoderConfig { window: 3, ..good.clone() }), "window");
         assert_eq!(field(EncoderConfig { key_int_max: 0, ..good.clone() }), "key_int_max");
         assert_eq!(field(EncoderConfig { subdivision_levels: 3, ..good }), "subdivision_levels");

@@ -1,5 +1,7 @@
 //! One slab through the sliding window (§VI): lattice, cleave, simplify, commit, fit, write.
 
+mod refits;
+
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -18,7 +20,7 @@ use crate::video::{Frame, LabelPlane, Volume};
 const TRANSITION_RATIO: f64 = 0.1;
 
 /// Vertices that blocks of a run are simplified to, over those that the simplification ratio allows: the rest is left to
-/// the window, where they compete with all others.
+/// the window, where they compete with all others. More where its first stage has more.
 const RUN_RATIO: f64 = 2.0;
 
 /// How many times the vertices that a window is to have it may grow to before its blocks are simplified.
@@ -99,6 +101,10 @@ pub(super) struct SlabEncoder<Q> {
     kept: u32,
     /// Packets that are fitted and written together, to look at each frame less often.
     batch: u32,
+    /// Fits on the way to the simplification ratio, where the window is the slab.
+    refits: u32,
+    /// [`RUN_RATIO`], or what the first of these fits needs.
+    run_ratio: f64,
     simplify_params: SimplifyParams,
     fit_params: FitParams,
     work: WorkMesh<Q>,
@@ -131,6 +137,8 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             error_gain,
             kept: config.kept_frames(),
             batch: config.window,
+            refits: config.refits,
+            run_ratio: RUN_RATIO.max(refits::first_stage(config.refits)),
             simplify_params: SimplifyParams {
                 max_extent_frames: config.window,
                 topology: config.topology,
@@ -192,7 +200,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         if self.is_steered() {
             return BlockGoal { keep: 0.0, max_error: RUN_ERROR * self.allowed_error(pixels), shift: 0.0 };
         }
-        let keep = RUN_RATIO * self.ratio * pixels / run.positions.len() as f64;
+        let keep = self.run_ratio * self.ratio * pixels / run.positions.len() as f64;
         BlockGoal { keep: keep.min(1.0), max_error: f32::INFINITY, shift: 0.0 }
     }
 
@@ -227,8 +235,12 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             }
             return Ok(Vec::new());
         }
+        let has_stages = is_whole && !self.is_steered();
+        if has_stages {
+            self.refit(unfrozen, goal.vertices, observer)?;
+        }
         observer.tell(Event::Began(Stage::Simplify));
-        if is_whole && !self.is_steered() {
+        if has_stages {
             for pass in &WINDOW_PASSES {
                 self.simplify_blocks(unfrozen, (pass.ratio * goal.vertices as f64) as usize, pass.shift, observer);
             }
@@ -271,7 +283,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             vertices: if steered { 0 } else { allowed(trailing.into()) },
             before: if frames.is_some() { i32::MAX } else { trailing as i32 * unit },
             vertices_in_window: match frames {
-                None if !steered => (RUN_RATIO * allowed(lead.into()) as f64 + TRANSITION_RATIO * pixels) as usize,
+                None if !steered => (self.run_ratio * allowed(lead.into()) as f64 + TRANSITION_RATIO * pixels) as usize,
                 _ => usize::MAX,
             },
             max_cost: f32::MAX,
@@ -315,34 +327,11 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         hops(&self.committed, stars, self.sent - 1).into_iter().map(|hop| hop >= FAR).collect()
     }
 
-    /// Fits what is unsent, in parts across the picture where it is large: memory follows the part. Tets are long in time
-    /// but not in space, so bands have few neighbours that would be looked at twice.
+    /// Fits what is unsent.
     fn fit(&mut self, stars: &StarTable) -> Result<FitReport, EncodeError> {
         let free = self.unsent(stars);
-        let axis = usize::from(self.committed.domain.height > self.committed.domain.width);
-        let mut places: Vec<i32> =
-            free.iter().zip(&self.committed.positions).filter(|(free, _)| **free).map(|(_, p)| p[axis]).collect();
-        places.sort_unstable();
-        let parts = places.len().div_ceil(FIT_VERTICES).max(1);
-        let mut total = FitReport::default();
-        let mut low = i32::MIN;
-        for part in 1..=parts {
-            let high = if part == parts { i32::MAX } else { places[part * places.len() / parts] };
-            let positions = &self.committed.positions;
-            let in_part = |v: usize| free[v] && (low..high).contains(&positions[v][axis]);
-            let free: Vec<bool> = (0..free.len()).map(in_part).collect();
-            let report = fit(&mut FitRequest {
-                mesh: &mut self.committed,
-                free: &free,
-                frames: &self.volume,
-                labels: self.labels.make_contiguous(),
-                params: &self.fit_params,
-            })?;
-            log::debug!("fit: {report:?}");
-            total = total.with(&report);
-            // A vertex may have moved past the limit; it is fitted again in the next part, which does no harm.
-            low = high;
-        }
+        let source = Source { frames: &self.volume, labels: self.labels.make_contiguous() };
+        let total = fit_in_parts(&mut self.committed, &free, source, &self.fit_params)?;
         let reached = ABSOLUTE_OVER_RMS * total.rms_after;
         if self.is_steered() && reached > 0.0 {
             self.error_gain *= (self.target_error / reached).powi(2).clamp(0.5, 2.0);
@@ -404,4 +393,39 @@ impl<Q: WedgeQuadric> WindowEncoder for SlabEncoder<Q> {
         let vertices = self.committed.positions.len() as u64;
         Ok(FinishedSlab { packets, vertices, error_gain: self.error_gain })
     }
+}
+
+/// What a mesh is fitted to.
+#[derive(Clone, Copy)]
+struct Source<'a> {
+    frames: &'a Volume,
+    labels: &'a [(u32, LabelPlane)],
+}
+
+/// Fits the free vertices of a mesh, in parts across the picture where they are many: memory follows the part. Tets are
+/// long in time but not in space, so bands have few neighbours that would be looked at twice.
+fn fit_in_parts(
+    mesh: &mut TetMesh,
+    free: &[bool],
+    Source { frames, labels }: Source<'_>,
+    params: &FitParams,
+) -> Result<FitReport, EncodeError> {
+    let axis = usize::from(mesh.domain.height > mesh.domain.width);
+    let mut places: Vec<i32> =
+        free.iter().zip(&mesh.positions).filter(|(free, _)| **free).map(|(_, p)| p[axis]).collect();
+    places.sort_unstable();
+    let parts = places.len().div_ceil(FIT_VERTICES).max(1);
+    let mut total = FitReport::default();
+    let mut low = i32::MIN;
+    for part in 1..=parts {
+        let high = if part == parts { i32::MAX } else { places[part * places.len() / parts] };
+        let in_part = |v: usize| free[v] && (low..high).contains(&mesh.positions[v][axis]);
+        let free: Vec<bool> = (0..free.len()).map(in_part).collect();
+        let report = fit(&mut FitRequest { mesh, free: &free, frames, labels, params })?;
+        log::debug!("fit: {report:?}");
+        total = total.with(&report);
+        // A vertex may have moved past the limit; it is fitted again in the next part, which does no harm.
+        low = high;
+    }
+    Ok(total)
 }

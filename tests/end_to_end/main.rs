@@ -102,6 +102,21 @@ fn settings_reach_the_stream() {
     }
 }
 
+/// A fit on the way lowers the error of as many vertices.
+#[test]
+fn refits_pay() {
+    const LARGE: (u32, u32) = (96, 64);
+    let frames = disc(LARGE, 0, 6);
+    let with = |refits: u32| {
+        let settings = EncoderConfig { refits, window: 60, simplification_ratio: 0.03, ..config(LARGE) };
+        let stream = encode(&frames, settings, &[]);
+        (stream.vertices, psnr(&frames, &decode(&stream.packets, LARGE, DecoderConfig::default())))
+    };
+    let ((vertices, without), (again, refitted)) = (with(0), with(2));
+    assert_eq!(vertices, again);
+    assert!(refitted > without + 0.3, "{without:.2} dB without, {refitted:.2} dB with two");
+}
+
 #[test]
 fn both_metrics_reach_the_ratio_asked_for() {
     const LARGE: (u32, u32) = (48, 32);

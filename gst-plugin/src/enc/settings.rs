@@ -31,6 +31,7 @@ struct Overrides {
     lattice_density: Option<f64>,
     topology: Option<Topology>,
     position_steps: Option<u32>,
+    refits: Option<u32>,
 }
 
 impl Default for Settings {
@@ -146,6 +147,15 @@ impl Settings {
                 default.position_steps,
             ),
             uint(
+                (
+                    "refits",
+                    "Refits",
+                    "Fits on the way to the simplification ratio, from which simplification starts anew",
+                ),
+                EncoderConfig::REFITS,
+                default.refits,
+            ),
+            uint(
                 ("threads", "Threads", "Worker threads; the stream does not depend on it (0 = all cores)"),
                 0..=MAX_THREADS,
                 u32::try_from(default.threads).unwrap_or(0),
@@ -166,6 +176,7 @@ impl Settings {
             lattice_density: own.lattice_density.unwrap_or(preset.lattice_density),
             topology: own.topology.map_or(preset.topology, Into::into),
             position_steps: own.position_steps.unwrap_or(preset.position_steps),
+            refits: own.refits.unwrap_or(preset.refits),
             ..preset
         }
     }
@@ -189,6 +200,7 @@ impl Settings {
             "lattice-density" => own.lattice_density = Some(double()),
             "topology" => own.topology = Some(value.get().expect("a topology")),
             "position-steps" => own.position_steps = Some(uint()),
+            "refits" => own.refits = Some(uint()),
             _ => unreachable!("no property {name}"),
         }
     }
@@ -210,6 +222,7 @@ impl Settings {
             "lattice-density" => config.lattice_density.to_value(),
             "topology" => Topology::from(config.topology).to_value(),
             "position-steps" => config.position_steps.to_value(),
+            "refits" => config.refits.to_value(),
             _ => unreachable!("no property {name}"),
         }
     }
