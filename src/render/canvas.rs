@@ -100,4 +100,20 @@ impl Canvas {
             channel[column] = value;
         }
     }
+
+    /// Makes one pixel stand out: halfway to white where it is dark, to black where it is light.
+    pub(super) fn set_apart(&mut self, column: usize, row: usize) {
+        let space = self.space;
+        let [first, second, third] = self.row_mut(row);
+        // Green stands for how light a colour is, as luma mostly does.
+        let other = match space {
+            ColorSpace::Rgb if second[column] < 128 => [255; 3],
+            ColorSpace::Rgb => [0; 3],
+            ColorSpace::Yuv(_) if first[column] < 126 => [235, 128, 128],
+            ColorSpace::Yuv(_) => [16, 128, 128],
+        };
+        for (channel, other) in [first, second, third].into_iter().zip(other) {
+            channel[column] = channel[column].midpoint(other);
+        }
+    }
 }

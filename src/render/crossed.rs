@@ -14,7 +14,6 @@ use glam::{Vec3A, Vec4};
 
 use super::canvas::Canvas;
 use super::coverage::Coverage;
-use super::draw::Piece;
 use super::pack::BAND_ROWS;
 use super::scan::{GRID_BITS, GridPoint, touched};
 use super::shade::Shade;
@@ -45,14 +44,19 @@ pub(super) struct Crossed {
 }
 
 impl Crossed {
-    /// Starts a band: marks the pixels that edges between labels cross.
-    pub(super) fn start<'a>(&mut self, view: &View, rows: Range<i32>, pieces: impl Iterator<Item = &'a Piece>) {
+    /// Starts a band: marks the pixels that edges between labels cross, given polygons and which of their edges are (bit
+    /// i: from corner i to the next).
+    pub(super) fn start<'a>(
+        &mut self,
+        view: &View,
+        rows: Range<i32>,
+        polygons: impl Iterator<Item = (&'a [GridPoint], u8)>,
+    ) {
         self.rows = rows;
         self.columns.clear();
         self.columns.resize(view.columns as usize, 0);
-        for piece in pieces.filter(|piece| piece.boundary != 0) {
-            let corners = piece.corners();
-            for i in (0..corners.len()).filter(|i| piece.boundary >> i & 1 != 0) {
+        for (corners, boundary) in polygons.filter(|(_, boundary)| *boundary != 0) {
+            for i in (0..corners.len()).filter(|i| boundary >> i & 1 != 0) {
                 self.mark(view, corners[i], corners[(i + 1) % corners.len()]);
             }
         }
@@ -134,16 +138,24 @@ impl Crossed {
 
     /// Paints the pixels into the band's rows.
     pub(super) fn paint(&self, canvas: &mut Canvas) {
-        let mut sums = self.sums.iter();
-        for (column, rows) in self.columns.iter().enumerate() {
-            let mut left = *rows;
-            while left != 0 {
-                let row = left.trailing_zeros() as usize;
-                left &= left - 1;
-                if let Some(sum) = sums.next().filter(|sum| sum.w > LEAST_AREA) {
-                    canvas.set(column, row, Vec3A::from_vec4(*sum) / sum.w);
-                }
+        for ([column, row], sum) in self.places().zip(&self.sums) {
+            if sum.w > LEAST_AREA {
+                canvas.set(column, row, Vec3A::from_vec4(*sum) / sum.w);
             }
         }
+    }
+
+    /// Column and row within the band of each marked pixel, in the order of their sums.
+    pub(super) fn places(&self) -> impl Iterator<Item = [usize; 2]> {
+        self.columns.iter().enumerate().flat_map(|(column, &rows)| {
+            let mut left = rows;
+            std::iter::from_fn(move || {
+                let row = left.trailing_zeros() as usize;
+                (left != 0).then(|| {
+                    left &= left - 1;
+                    [column, row]
+                })
+            })
+        })
     }
 }

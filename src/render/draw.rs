@@ -162,6 +162,9 @@ pub struct DrawParams {
     pub antialias: bool,
     /// The part of the picture to draw; `None`: the whole.
     pub viewport: Option<Viewport>,
+    /// Whether the control mesh's cross-section is drawn over the picture, as lines that are lighter or darker than
+    /// what they cross.
+    pub mesh: bool,
 }
 
 impl Scene {
@@ -181,7 +184,12 @@ impl Scene {
         self.cut(t, params.levels, &mut lists, |list, _, polygon| {
             Patch::new(&view, polygon).convex(|patch| list.push(&view, space, antialias, &patch));
         });
-        fill(&lists, &self.painters, &view, antialias, surface);
+        let mut outlines: Vec<Vec<Patch>> = Vec::new();
+        if params.mesh {
+            self.cut(t, 0, &mut outlines, |list, _, polygon| list.push(Patch::new(&view, polygon)));
+        }
+        let picture = Picture { view: &view, antialias, lists: &lists, outlines: &outlines };
+        picture.fill(&self.painters, surface);
         self.pieces = lists;
         Ok(())
     }
@@ -217,41 +225,40 @@ impl Painters {
     }
 }
 
-/// Paints all bands.
-fn fill(lists: &[Pieces], painters: &Painters, view: &View, antialias: bool, surface: &mut Surface<'_>) {
-    let by_band = BandTable::new(lists, view.rows as usize);
-    for_each(bands(surface), |mut band| {
-        let names = by_band.row(band.index());
-        painters.with(|painter| painter.paint(view, antialias, &mut band, &Named { lists, names }));
-    });
-}
-
-/// Pieces by name.
-struct Named<'a> {
+/// All that is painted.
+struct Picture<'a> {
+    view: &'a View,
+    antialias: bool,
     lists: &'a [Pieces],
-    names: &'a [u32],
+    /// Polygons whose edges are drawn over the rest.
+    outlines: &'a [Vec<Patch>],
 }
 
-impl<'a> Named<'a> {
-    fn pieces(&self) -> impl Iterator<Item = &'a Piece> {
-        self.iter().map(|(list, place)| &list.pieces[place])
+impl<'a> Picture<'a> {
+    /// Paints all bands.
+    fn fill(&self, painters: &Painters, surface: &mut Surface<'_>) {
+        let by_band = BandTable::new(self.lists, self.view.rows as usize);
+        for_each(bands(surface), |mut band| {
+            let names = by_band.row(band.index());
+            painters.with(|painter| painter.paint(self, names, &mut band));
+        });
     }
 
-    fn iter(&self) -> impl Iterator<Item = (&'a Pieces, usize)> {
+    fn named(&self, names: &'a [u32]) -> impl Iterator<Item = (&'a Pieces, usize)> {
         let lists = self.lists;
-        self.names
-            .iter()
-            .map(move |&name| (&lists[(name >> NAME_BITS) as usize], name as usize & ((1 << NAME_BITS) - 1)))
+        names.iter().map(move |&name| (&lists[(name >> NAME_BITS) as usize], name as usize & ((1 << NAME_BITS) - 1)))
     }
 }
 
 impl Painter {
-    fn paint(&mut self, view: &View, antialias: bool, band: &mut Band<'_>, named: &Named<'_>) {
+    /// Paints a band, which the named pieces touch.
+    fn paint<'a>(&mut self, picture: &Picture<'a>, names: &'a [u32], band: &mut Band<'_>) {
         let Self { canvas, crossed } = self;
-        let (rows, width) = (band.rows(), view.columns as usize);
+        let (rows, width) = (band.rows(), picture.view.columns as usize);
         let space = band.space();
         canvas.start(space, width, rows.len());
-        for piece in named.pieces() {
+        for (list, place) in picture.named(names) {
+            let piece = &list.pieces[place];
             let both = piece.first_row.max(rows.start)..piece.end_row.min(rows.end);
             let brush = piece.run.brush(space);
             scan(piece.corners(), both, |row, columns| {
@@ -261,12 +268,19 @@ impl Painter {
                 }
             });
         }
-        if antialias {
-            crossed.start(view, rows, named.pieces());
-            for (list, place) in named.iter() {
+        if picture.antialias {
+            let pieces = picture.named(names).map(|(list, place)| &list.pieces[place]);
+            crossed.start(picture.view, rows.clone(), pieces.map(|piece| (piece.corners(), piece.boundary)));
+            for (list, place) in picture.named(names) {
                 crossed.add(list.pieces[place].corners(), &list.shades[place]);
             }
             crossed.paint(canvas);
+        }
+        if !picture.outlines.is_empty() {
+            const ALL_EDGES: u8 = 0b1111;
+            let outlines = picture.outlines.iter().flatten().map(|patch| (patch.corners(), ALL_EDGES));
+            crossed.start(picture.view, rows, outlines);
+            crossed.places().for_each(|[column, row]| canvas.set_apart(column, row));
         }
         band.pack(canvas);
     }

@@ -123,8 +123,9 @@ impl Run {
         let extent = ((high.x - low.x).max(high.y - low.y)) as f64 * PIXEL;
         let [mut right, mut down] = gradient(&patch.corners, &colors);
         let steepest = right.abs().max_element().max(down.abs().max_element());
-        // What is no number is not less either.
-        if !(steepest * extent.max(1.0) < STEEPEST) {
+        // What is no number does not hold either.
+        let holds = steepest * extent.max(1.0) < STEEPEST;
+        if !holds {
             (right, down) = (DVec3::ZERO, DVec3::ZERO);
         }
         let offset = |from: i64, pixel: i32| ((i64::from(pixel) << GRID_BITS) + (1 << (GRID_BITS - 1)) - from) as f64;
