@@ -91,8 +91,9 @@ impl Patch {
     }
 }
 
-/// A convex polygon that turns from +x to +y, ready to be painted.
+/// A convex polygon that turns from +x to +y, ready to be painted; two lines of the cache.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 pub(super) struct Piece {
     corners: [GridPoint; 4],
     run: Run,

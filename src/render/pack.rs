@@ -93,39 +93,42 @@ impl Band<'_> {
             let (bytes, stride) = &mut self.planes[if interleaved { 1 } else { channel }];
             for (pair, bytes) in bytes.chunks_mut(*stride).enumerate() {
                 // An odd last row stands for both.
-                let found = halved([2 * pair, (2 * pair + 1).min(rows - 1)].map(|row| canvas.row(row, channel)));
+                let rows = [2 * pair, (2 * pair + 1).min(rows - 1)].map(|row| canvas.row(row, channel));
                 if interleaved {
                     let (places, _) = bytes[..2 * samples].as_chunks_mut::<2>();
-                    places.iter_mut().zip(found).for_each(|(place, found)| place[channel - 1] = found);
+                    halve(rows, places, |place, sample| place[channel - 1] = sample);
                 } else {
-                    bytes[..samples].iter_mut().zip(found).for_each(|(place, found)| *place = found);
+                    halve(rows, &mut bytes[..samples], |place, sample| *place = sample);
                 }
             }
         }
     }
 }
 
-/// Two rows as one of half the width.
-fn halved(rows: [&[u8]; 2]) -> impl Iterator<Item = u8> {
+/// Makes one row of half the width from two, sample by sample.
+#[inline]
+fn halve<P>(rows: [&[u8]; 2], places: &mut [P], put: impl Fn(&mut P, u8)) {
     let width = rows[0].len();
-    // Pairs of bytes as numbers of 16 bits are what vector units take apart fastest: the lower half is the first byte.
-    let pairs =
-        |from: usize| rows.map(|row| row[from..].as_chunks::<2>().0.iter().map(|&pair| u16::from_le_bytes(pair)));
     let sum = |before: u16, here: u16, after: u16| before + 2 * here + after;
     let mean = |sum: u16| ((sum + 4) >> 3) as u8;
+    // Pairs of bytes as numbers of 16 bits are what vector units take apart fastest: the lower half is the first byte.
+    let [[upper, lower], [upper_before, lower_before]] = [2, 1].map(|from| rows.map(|row| pairs(row, from)));
+    let inner = places.iter_mut().skip(1).zip(upper.zip(lower)).zip(upper_before.zip(lower_before));
+    inner.for_each(|((place, (upper, lower)), (upper_before, lower_before))| {
+        let row = |before: u16, pair: u16| sum(before & 255, pair & 255, pair >> 8);
+        put(place, mean(row(upper_before, upper) + row(lower_before, lower)));
+    });
+    // Beyond the ends of a row its outermost columns stand in.
     let edge = |before: usize, here: usize, after: usize| {
         mean(rows.map(|row| sum(row[before].into(), row[here].into(), row[after].into())).iter().sum())
     };
-    let [upper, lower] = pairs(0);
-    let [upper_before, lower_before] = pairs(1);
-    let inner = upper.zip(lower).skip(1).zip(upper_before.zip(lower_before)).map(
-        move |((upper, lower), (upper_before, lower_before))| {
-            let row = |before: u16, pair: u16| sum(before & 255, pair & 255, pair >> 8);
-            mean(row(upper_before, upper) + row(lower_before, lower))
-        },
-    );
-    // Beyond the ends of a row its outermost columns stand in.
-    let first = edge(0, 0, 1.min(width - 1));
-    let last = (width > 1 && width % 2 == 1).then(|| edge(width - 2, width - 1, width - 1));
-    std::iter::once(first).chain(inner).chain(last)
+    put(&mut places[0], edge(0, 0, 1.min(width - 1)));
+    if width % 2 == 1 && width > 1 {
+        put(&mut places[width / 2], edge(width - 2, width - 1, width - 1));
+    }
+}
+
+/// A row's columns two by two, from a column on.
+fn pairs(row: &[u8], from: usize) -> impl Iterator<Item = u16> {
+    row.get(from..).unwrap_or_default().as_chunks::<2>().0.iter().map(|&pair| u16::from_le_bytes(pair))
 }

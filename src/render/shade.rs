@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use glam::{DVec3, Vec3A};
+use wide::{i16x8, u8x16};
 
 use super::canvas::{CHUNK, ColorSpace};
 use super::coverage::Part;
@@ -138,7 +139,7 @@ impl Run {
     #[inline]
     pub(super) fn brush(&self, space: ColorSpace) -> Brush<'_> {
         let wide = self.columns as usize > SHORT && self.way == Way::Chunks;
-        Brush { run: self, space, lanes: if wide { self.right.map(lanes) } else { [[0; CHUNK]; 3] } }
+        Brush { run: self, space, lanes: if wide { self.right.map(lanes) } else { [[i16x8::ZERO; 2]; 3] } }
     }
 }
 
@@ -148,7 +149,7 @@ pub(super) struct Brush<'a> {
     run: &'a Run,
     space: ColorSpace,
     /// The steps from a chunk's first pixel to each, where there are chunks.
-    lanes: [[i16; CHUNK]; 3],
+    lanes: [Lanes; 3],
 }
 
 impl Brush<'_> {
@@ -211,7 +212,7 @@ fn fixed(values: DVec3) -> [i32; 3] {
 
 /// Paints `count` bytes, chunk by chunk; there must be room for a whole last one.
 #[inline]
-fn paint_chunks(mut bytes: &mut [u8], mut value: i32, advance: i32, lanes: &[i16; CHUNK], count: usize) {
+fn paint_chunks(mut bytes: &mut [u8], mut value: i32, advance: i32, lanes: &Lanes, count: usize) {
     let mut left = count;
     while let Some((chunk, others)) = bytes.split_first_chunk_mut() {
         paint_chunk(chunk, to_chunk(value), lanes, left);
@@ -224,11 +225,15 @@ fn paint_chunks(mut bytes: &mut [u8], mut value: i32, advance: i32, lanes: &[i16
     }
 }
 
-/// The step from a chunk's first pixel to each, given that from one pixel to the next.
+/// The steps from a chunk's first pixel to each.
+type Lanes = [i16x8; 2];
+
+/// The steps of a chunk, given that from one pixel to the next.
 #[inline]
-fn lanes(right: i32) -> [i16; CHUNK] {
+fn lanes(right: i32) -> Lanes {
     const SHIFT: u32 = FRACTION - CHUNK_FRACTION;
-    std::array::from_fn(|i| (right.wrapping_mul(i as i32).wrapping_add(1 << (SHIFT - 1)) >> SHIFT) as i16)
+    let lane = |i: i32| (right.wrapping_mul(i).wrapping_add(1 << (SHIFT - 1)) >> SHIFT) as i16;
+    [0, 8].map(|from| i16x8::new(std::array::from_fn(|i| lane(from + i as i32))))
 }
 
 /// A value as the start of a chunk.
@@ -238,25 +243,33 @@ fn to_chunk(value: i32) -> i16 {
     (value.wrapping_add(1 << (SHIFT - 1)) >> SHIFT) as i16
 }
 
-#[inline]
-fn level(start: i16, lane: i16) -> u8 {
-    (start.wrapping_add(lane) >> CHUNK_FRACTION).clamp(0, 255) as u8
-}
-
 /// Paints the first `count` pixels of a chunk, all if there are more.
 #[inline]
-fn paint_chunk(bytes: &mut [u8; CHUNK], start: i16, lanes: &[i16; CHUNK], count: usize) {
-    const PLACES: [u8; CHUNK] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
-    let painted: [u8; CHUNK] = std::array::from_fn(|i| level(start, lanes[i]));
+fn paint_chunk(bytes: &mut [u8; CHUNK], start: i16, lanes: &Lanes, count: usize) {
+    let start = i16x8::splat(start);
+    // Saturates to [0, 255].
+    let painted =
+        u8x16::narrow_i16x8((start + lanes[0]) >> CHUNK_FRACTION as i32, (start + lanes[1]) >> CHUNK_FRACTION as i32);
     if count >= CHUNK {
-        *bytes = painted;
+        *bytes = painted.to_array();
         return;
     }
-    let count = count as u8;
-    for i in 0..CHUNK {
-        bytes[i] = if PLACES[i] < count { painted[i] } else { bytes[i] };
-    }
+    let mask = u8x16::new(MASKS[count]);
+    *bytes = ((painted & mask) | (u8x16::new(*bytes) & !mask)).to_array();
 }
+
+/// All bits of the first so many bytes.
+const MASKS: [[u8; CHUNK]; CHUNK] = {
+    let mut masks = [[0; CHUNK]; CHUNK];
+    let mut i = 0;
+    while i < CHUNK * CHUNK {
+        if i % CHUNK < i / CHUNK {
+            masks[i / CHUNK][i % CHUNK] = 255;
+        }
+        i += 1;
+    }
+    masks
+};
 
 #[cfg(test)]
 mod tests {

@@ -8,6 +8,7 @@ use gst::subclass::prelude::*;
 
 use super::CAT;
 use super::imp::TetvecDec;
+use super::view::Shape;
 
 impl TetvecDec {
     /// An event from upstream.
@@ -66,13 +67,13 @@ impl TetvecDec {
 
     /// A navigation event with its place in pixels of the source.
     fn to_source_places(&self, event: gst::Event) -> gst::Event {
-        let size = self.lock_output().output.as_ref().map(|output| (output.info.width(), output.info.height()));
-        let (Some(size), Some(source), Some(structure)) = (size, self.lock_stream().source, event.structure()) else {
+        let shape = self.lock_output().output.as_ref().map(|output| Shape::of(&output.info));
+        let (Some(shape), Some(source), Some(structure)) = (shape, self.lock_stream().source, event.structure()) else {
             return event;
         };
         let place = |name| structure.get::<f64>(name).ok();
         let (Some(x), Some(y)) = (place("pointer_x"), place("pointer_y")) else { return event };
-        let [x, y] = self.view().to_source([x, y], size, source);
+        let [x, y] = self.view().to_source([x, y], shape, source);
         let mut structure = structure.to_owned();
         structure.set("pointer_x", x);
         structure.set("pointer_y", y);

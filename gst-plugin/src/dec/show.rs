@@ -11,6 +11,7 @@ use super::CAT;
 use super::imp::TetvecDec;
 use super::stream::{Decoded, Pending};
 use super::timing::{Picture, Span};
+use super::view::Shape;
 
 impl TetvecDec {
     /// Shows the pictures of a packet, of a lost one where it has no number.
@@ -65,7 +66,7 @@ impl TetvecDec {
             let params = RenderParams {
                 // Beyond the last frame that came stands the last picture of it.
                 frame: pending.frame.unwrap_or(f64::INFINITY),
-                viewport: stream.source.and_then(|source| view.viewport(source)),
+                viewport: stream.source.and_then(|source| view.viewport(source, Shape::of(&output.info))),
                 mesh: view.mesh,
             };
             let Some(next) = next else { return stream.render(&params, surface) };
