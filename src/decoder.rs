@@ -183,12 +183,13 @@ impl Decoder {
             Ok((slab, params)) => {
                 let (draw, parse) = (|| slab.draw(&params, surface), || self.parser.parse_packet(data));
                 #[cfg(feature = "threads")]
-                match &self.pool {
+                let both = match &self.pool {
                     Some(pool) => pool.install(|| rayon::join(draw, parse)),
                     None => rayon::join(draw, parse),
-                }
+                };
                 #[cfg(not(feature = "threads"))]
-                (draw(), parse())
+                let both = one_by_one(draw, parse);
+                both
             }
         };
         (drawn, self.take_packet(parsed))
@@ -226,6 +227,11 @@ impl Slab {
     fn draw(&mut self, at: &DrawingAt, surface: &mut Surface<'_>) -> Result<(), DecodeError> {
         Ok(self.scene.draw(at.frame, &at.params, surface)?)
     }
+}
+
+#[cfg(not(feature = "threads"))]
+fn one_by_one<A, B>(first: impl FnOnce() -> A, second: impl FnOnce() -> B) -> (A, B) {
+    (first(), second())
 }
 
 /// Deepest subdivision drawn, as in the stream's header.
