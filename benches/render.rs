@@ -37,7 +37,7 @@ fn slab(cell: u32, labels: i32) -> TetMesh {
 
 /// Draws all frames in order with one thread, from a scene that has refined nothing yet.
 fn play(mesh: &TetMesh, levels: u8, antialias: bool, (width, height): (u32, u32), data: &mut [u8]) {
-    let params = DrawParams { levels, antialias, viewport: None };
+    let params = DrawParams { levels, antialias, viewport: None, mesh: false };
     let mut scene = Scene::new(mesh.domain);
     scene.extend(mesh);
     for frame in 0..FRAMES {

@@ -80,7 +80,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
     let levels = arguments.levels.unwrap_or(slab.levels);
     let mut ours = original.clone();
-    let params = DrawParams { levels, antialias: true, viewport: None };
+    let params = DrawParams { levels, antialias: true, viewport: None, mesh: false };
     draw(&slab.mesh, slab.time, &params, &mut Surface::of_frame(&mut ours))?;
 
     let scale = arguments.scale.unwrap_or((PANEL_WIDTH / size.0).max(1));
@@ -171,7 +171,7 @@ fn read_slab(path: &Path, frame: u32) -> Result<Slab, Box<dyn Error>> {
 fn zoomed(slab: &Slab, levels: u8, region: Region, zoom: u32) -> Result<RgbImage, Box<dyn Error>> {
     let (width, height) = region.size(zoom);
     let mut picture = Frame::from_fn(width, height, |_, _| [0; 3])?;
-    let params = DrawParams { levels, antialias: true, viewport: Some(region.viewport()) };
+    let params = DrawParams { levels, antialias: true, viewport: Some(region.viewport()), mesh: false };
     draw(&slab.mesh, slab.time, &params, &mut Surface::of_frame(&mut picture))?;
     Ok(panels::enlarge(&picture, 1))
 }

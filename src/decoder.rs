@@ -4,7 +4,7 @@
 
 use thiserror::Error;
 
-use crate::bitstream::{Limits, ParseError, SequenceHeader, SlabParser};
+use crate::bitstream::{Limits, PacketHeader, ParseError, SequenceHeader, SlabParser};
 pub use crate::render::Viewport;
 use crate::render::{DrawParams, Scene, ViewportError};
 use crate::video::Surface;
@@ -69,6 +69,18 @@ pub struct Decoder {
     pool: Option<rayon::ThreadPool>,
 }
 
+/// Which picture to draw.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RenderParams {
+    /// Frame number counted from the start of the stream; fractions lie between frames. It is clamped to the current
+    /// slab, and to the frames whose packets have come.
+    pub frame: f64,
+    /// The part of the picture to draw; `None`: the whole.
+    pub viewport: Option<Viewport>,
+    /// Whether the control mesh's cross-section is drawn over the picture.
+    pub mesh: bool,
+}
+
 /// The slab that is drawn.
 #[derive(Debug)]
 struct Slab {
@@ -102,7 +114,12 @@ impl Decoder {
     /// # Errors
     /// Damaged, missing or oversized data.
     pub fn send_packet(&mut self, data: &[u8]) -> Result<PacketInfo, DecodeError> {
-        let packet = self.parser.parse_packet(data)?;
+        let parsed = self.parser.parse_packet(data);
+        self.take_packet(parsed)
+    }
+
+    fn take_packet(&mut self, parsed: Result<PacketHeader, ParseError>) -> Result<PacketInfo, DecodeError> {
+        let packet = parsed?;
         if packet.picture {
             self.take_mesh(packet.keyframe);
         }
@@ -125,9 +142,7 @@ impl Decoder {
         };
     }
 
-    /// Draws the picture at time `frame` (frame number counted from the start of the stream, fractions lie between
-    /// frames) of the current slab; `frame` is clamped to the slab, and to the frames whose packets have come.
-    /// `viewport` `None`: the whole picture.
+    /// Draws the picture at time `frame` (as of [`RenderParams::frame`]). `viewport` `None`: the whole picture.
     ///
     /// # Errors
     /// Nothing decoded yet, or an unusable viewport.
@@ -137,17 +152,47 @@ impl Decoder {
         viewport: Option<Viewport>,
         surface: &mut Surface<'_>,
     ) -> Result<(), DecodeError> {
-        let (Some(slab), Some(header)) = (&mut self.slab, self.parser.header()) else {
-            return Err(DecodeError::NoKeyframe);
-        };
-        let levels = self.config.subdivision_levels.unwrap_or(header.subdivision_levels).min(MAX_LEVELS);
-        let params = DrawParams { levels, antialias: self.config.antialias, viewport };
-        let frame = (frame - slab.first_frame as f64).min(slab.last_frame);
+        self.render_with(&RenderParams { frame, viewport, mesh: false }, surface)
+    }
+
+    /// Draws a picture.
+    ///
+    /// # Errors
+    /// Nothing decoded yet, or an unusable viewport.
+    pub fn render_with(&mut self, params: &RenderParams, surface: &mut Surface<'_>) -> Result<(), DecodeError> {
+        let (slab, params) = drawing(&self.config, &self.parser, &mut self.slab, params)?;
         #[cfg(feature = "threads")]
         if let Some(pool) = &self.pool {
-            return Ok(pool.install(|| slab.scene.draw(frame, &params, surface))?);
+            return pool.install(|| slab.draw(&params, surface));
         }
-        Ok(slab.scene.draw(frame, &params, surface)?)
+        slab.draw(&params, surface)
+    }
+
+    /// [`Self::render_with`], and at the same time, on another thread where there is one, [`Self::send_packet`] with the
+    /// packet that comes next: the picture is one of before it.
+    ///
+    /// Returns what both would have returned.
+    pub fn render_and_send(
+        &mut self,
+        params: &RenderParams,
+        surface: &mut Surface<'_>,
+        data: &[u8],
+    ) -> (Result<(), DecodeError>, Result<PacketInfo, DecodeError>) {
+        let (drawn, parsed) = match drawing(&self.config, &self.parser, &mut self.slab, params) {
+            Err(error) => (Err(error), self.parser.parse_packet(data)),
+            Ok((slab, params)) => {
+                let (draw, parse) = (|| slab.draw(&params, surface), || self.parser.parse_packet(data));
+                #[cfg(feature = "threads")]
+                let both = match &self.pool {
+                    Some(pool) => pool.install(|| rayon::join(draw, parse)),
+                    None => rayon::join(draw, parse),
+                };
+                #[cfg(not(feature = "threads"))]
+                let both = one_by_one(draw, parse);
+                both
+            }
+        };
+        (drawn, self.take_packet(parsed))
     }
 
     /// Forgets everything and waits for a keyframe.
@@ -155,6 +200,38 @@ impl Decoder {
         self.parser.flush();
         self.slab = None;
     }
+}
+
+/// What is drawn of which slab.
+fn drawing<'a>(
+    config: &DecoderConfig,
+    parser: &SlabParser,
+    slab: &'a mut Option<Slab>,
+    params: &RenderParams,
+) -> Result<(&'a mut Slab, DrawingAt), DecodeError> {
+    let (Some(slab), Some(header)) = (slab, parser.header()) else { return Err(DecodeError::NoKeyframe) };
+    let levels = config.subdivision_levels.unwrap_or(header.subdivision_levels).min(MAX_LEVELS);
+    let frame = (params.frame - slab.first_frame as f64).min(slab.last_frame);
+    let RenderParams { viewport, mesh, .. } = *params;
+    Ok((slab, DrawingAt { frame, params: DrawParams { levels, antialias: config.antialias, viewport, mesh } }))
+}
+
+/// A picture of a slab.
+struct DrawingAt {
+    /// Frames since the slab's first.
+    frame: f64,
+    params: DrawParams,
+}
+
+impl Slab {
+    fn draw(&mut self, at: &DrawingAt, surface: &mut Surface<'_>) -> Result<(), DecodeError> {
+        Ok(self.scene.draw(at.frame, &at.params, surface)?)
+    }
+}
+
+#[cfg(not(feature = "threads"))]
+fn one_by_one<A, B>(first: impl FnOnce() -> A, second: impl FnOnce() -> B) -> (A, B) {
+    (first(), second())
 }
 
 /// Deepest subdivision drawn, as in the stream's header.

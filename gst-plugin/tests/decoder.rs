@@ -184,9 +184,12 @@ fn caps_may_change_while_playing() {
     assert_eq!(widths.len(), 5, "{widths:?}");
 }
 
+/// The picture before a loss stands in, marked, up to the next keyframe.
 #[test]
 fn a_damaged_packet_costs_only_what_depends_on_it() {
     let bytes = stream(15);
+    let file = TempFile::new(&bytes);
+    let whole = run(&format!("{} ! tetvecparse ! tetvecdec", file.source())).expect_clean();
     for damaged in [0usize, 2, 5, 7, 14] {
         let mut broken = bytes.clone();
         let (at, header) = packets(&bytes)[damaged];
@@ -194,11 +197,21 @@ fn a_damaged_packet_costs_only_what_depends_on_it() {
         let file = TempFile::new(&broken);
         let outcome = run(&format!("{} ! tetvecparse ! tetvecdec", file.source())).expect_clean();
         let lost = damaged..(damaged / 5 + 1) * 5;
-        let expected: Vec<u64> = (0..15).filter(|k| !lost.contains(&(*k as usize))).collect();
-        assert_eq!(numbers(&outcome), expected, "packet {damaged}");
+        let first = if damaged == 0 { lost.end as u64 } else { 0 };
+        assert_eq!(numbers(&outcome), (first..15).collect::<Vec<_>>(), "packet {damaged}");
         assert_eq!(outcome.warnings.len(), 1, "{:?}", outcome.warnings);
-        let after = outcome.buffers().zip(&expected).find(|(_, k)| **k as usize >= lost.end);
-        assert!(after.is_none_or(|(buffer, _)| buffer.flags().contains(gst::BufferFlags::DISCONT)));
+        let mut last = None;
+        for (sample, k) in outcome.samples.iter().zip(first as usize..) {
+            let flags = sample.buffer().expect("a buffer").flags();
+            assert_eq!(flags.contains(gst::BufferFlags::CORRUPTED), lost.contains(&k), "packet {damaged}, frame {k}");
+            let shown = plane(sample, 0);
+            if !lost.contains(&k) {
+                assert!(shown == plane(&whole.samples[k], 0), "packet {damaged}, frame {k}");
+            } else if k > damaged {
+                assert!(Some(&shown) == last.as_ref(), "packet {damaged}: frame {k} stands still");
+            }
+            last = Some(shown);
+        }
     }
 }
 
@@ -210,13 +223,18 @@ fn a_keyframe_is_asked_for_once_after_a_loss() {
     assert_eq!(push(&mut harness, &packets[0]), 1);
     while harness.try_pull_upstream_event().is_some() {}
     for damaged in [&damage(&packets[1]), &packets[2], &packets[3]] {
-        assert_eq!(push(&mut harness, damaged), 0);
+        harness.push(damaged.clone()).expect("a packet is taken");
+        let stands_in = harness.pull().expect("a picture in place of the lost one");
+        assert!(stands_in.flags().contains(gst::BufferFlags::CORRUPTED));
+        assert_eq!(stands_in.pts(), damaged.pts());
     }
     let asked = std::iter::from_fn(|| harness.try_pull_upstream_event())
         .filter(|event| gst_video::ForceKeyUnitEvent::is(event))
         .count();
     assert_eq!(asked, 1);
-    assert_eq!(push(&mut harness, &packets[5]), 1);
+    harness.push(packets[5].clone()).expect("a packet is taken");
+    let after = harness.pull().expect("a picture").flags();
+    assert!(!after.contains(gst::BufferFlags::CORRUPTED) && after.contains(gst::BufferFlags::DISCONT));
 }
 
 #[test]
@@ -335,4 +353,84 @@ fn the_level_of_subdivision_and_the_threads_can_be_set() {
     }
     let fitted = tetvec::EncoderConfig::new(48, 32).subdivision_levels;
     assert_eq!(play(&format!("subdivision-levels={fitted}")), play(""));
+}
+
+/// A pipeline that shows the small stream in RGB through a decoder with these properties.
+fn view(file: &TempFile, properties: &str, size: (i32, i32)) -> Outcome {
+    let caps = format!("video/x-raw,format=RGB,width={},height={}", size.0, size.1);
+    run(&format!("{} ! tetvecparse ! tetvecdec {properties} ! {caps}", file.source())).expect_clean()
+}
+
+#[test]
+fn a_viewport_shows_a_part() {
+    let file = TempFile::new(&stream(2));
+    let whole = plane(&view(&file, "", (48 * 4, 32 * 4)).samples[1], 0);
+    let part = view(&file, "viewport-x=12 viewport-y=8 viewport-width=24 viewport-height=16", (24 * 4, 16 * 4));
+    let part = plane(&part.samples[1], 0);
+    for y in 0..64 {
+        let row = &whole[3 * ((y + 32) * 192 + 48)..][..3 * 96];
+        let shown = &part[3 * y * 96..][..3 * 96];
+        assert!(row.iter().zip(shown).all(|(a, b)| a.abs_diff(*b) <= 1), "row {y}");
+    }
+    let corner = view(&file, "viewport-x=24 viewport-y=16", (24 * 4, 16 * 4));
+    let corner = plane(&corner.samples[0], 0);
+    let row = &plane(&view(&file, "", (48 * 4, 32 * 4)).samples[0], 0)[3 * (64 * 192 + 96)..][..3 * 96];
+    assert!(row.iter().zip(&corner[..3 * 96]).all(|(a, b)| a.abs_diff(*b) <= 1), "sides of 0 reach to the edges");
+}
+
+#[test]
+fn a_viewport_follows_its_controller_and_its_owner() {
+    let file = TempFile::new(&stream(10));
+    let caps = "video/x-raw,format=RGB,width=48,height=32";
+    let description = format!("{} ! tetvecparse ! tetvecdec name=decoder viewport-x=-48 ! {caps}", file.source());
+    let running = Running::new(&description);
+    let decoder = running.element("decoder");
+    let count = std::sync::atomic::AtomicU32::new(0);
+    let watched = decoder.clone();
+    decoder.static_pad("src").expect("a pad").add_probe(gst::PadProbeType::BUFFER, move |_, _| {
+        if count.fetch_add(1, std::sync::atomic::Ordering::Relaxed) == 4 {
+            watched.set_property("viewport-x", 0.0);
+        }
+        gst::PadProbeReturn::Ok
+    });
+    let outcome = running.finish().expect_clean();
+    // To the left of the source all is black.
+    let left = |sample: &gst::Sample| plane(sample, 0).chunks(3 * 48).all(|row| row[..3 * 24].iter().all(|v| *v == 0));
+    let dark: Vec<bool> = outcome.samples.iter().map(left).collect();
+    assert_eq!(dark[..5], [true; 5], "the property is set after the fifth picture");
+    let whole = view(&file, "", (48, 32));
+    assert!(plane(&outcome.samples[9], 0) == plane(&whole.samples[9], 0));
+}
+
+#[test]
+fn a_mesh_is_drawn_over_the_picture() {
+    let file = TempFile::new(&stream(1));
+    for levels in [0, 1] {
+        let settings = format!("subdivision-levels={levels}");
+        let plain = plane(&view(&file, &settings, (480, 320)).samples[0], 0);
+        let lined = plane(&view(&file, &format!("{settings} draw-mesh=true"), (480, 320)).samples[0], 0);
+        let changed = plain.chunks(3).zip(lined.chunks(3)).filter(|(a, b)| a != b).count();
+        assert!((480..480 * 320 / 2).contains(&changed), "level {levels}: {changed} pixels");
+    }
+}
+
+#[test]
+fn places_of_navigation_go_upstream_in_source_pixels() {
+    let coded = encode(&raw(2));
+    let packets = pictures(&coded);
+    let mut harness = harness(&coded);
+    let decoder = harness.element().expect("an element");
+    decoder.set_property("viewport-x", 12.0);
+    decoder.set_property("viewport-width", 24.0);
+    assert_eq!(push(&mut harness, &packets[0]), 1);
+    let structure = gst::Structure::builder("application/x-gst-navigation")
+        .field("event", "mouse-move")
+        .field("pointer_x", 24.0)
+        .field("pointer_y", 16.0)
+        .build();
+    while harness.try_pull_upstream_event().is_some() {}
+    assert!(harness.push_upstream_event(gst::event::Navigation::new(structure)));
+    let found = harness.pull_upstream_event().expect("a navigation event");
+    let place = |name| found.structure().expect("a place").get::<f64>(name);
+    assert_eq!((place("pointer_x"), place("pointer_y")), (Ok(24.0), Ok(16.0)));
 }

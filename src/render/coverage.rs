@@ -1,15 +1,15 @@
-//! How much of a pixel a triangle covers, exactly: the area of their common part, and its moment.
+//! How much of a pixel a convex polygon covers, exactly: the area of their common part, and its moment.
 //!
-//! Places are in pixels from a pixel's centre, so a pixel is the square [-1/2, 1/2]^2 of area 1. A side of the triangle
+//! Places are in pixels from a pixel's centre, so a pixel is the square [-1/2, 1/2]^2 of area 1. A side of the polygon
 //! cuts the pixel if its value at the centre lies within +-(|x| + |y|) / 2 of its normal. Pixels cut once or twice, nearly
-//! all, have formulas of their own: this runs for each triangle at each pixel on a boundary. For the same reason normals
+//! all, have formulas of their own: this runs for each polygon at each pixel on a boundary. For the same reason normals
 //! are of any length, which saves divisions.
 
 use glam::DVec2;
 
 use super::scan::{GridPoint, center_offset};
 
-/// Corners of a pixel in the triangle's sense of turning; corner i ends side i, and side 0 is the upper one.
+/// Corners of a pixel in the polygon's sense of turning; corner i ends side i, and side 0 is the upper one.
 const CORNERS: [DVec2; 4] =
     [DVec2::new(0.5, -0.5), DVec2::new(0.5, 0.5), DVec2::new(-0.5, 0.5), DVec2::new(-0.5, -0.5)];
 
@@ -91,49 +91,60 @@ impl HalfPlane {
     }
 }
 
-/// A triangle that covers pixels.
+/// A convex polygon that covers pixels.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Coverage {
     /// Side i leads from corner i to the next; seen from `origin`, as the corners are.
-    sides: [HalfPlane; 3],
-    corners: [DVec2; 3],
+    sides: [HalfPlane; 4],
+    corners: [DVec2; 4],
+    count: usize,
     /// Column and row of the pixel that all is seen from.
     origin: [i32; 2],
 }
 
 impl Coverage {
-    /// Of a positive triangle. Near `origin` (column, row) it is most exact.
+    /// Of a convex polygon of 3 or 4 corners that turns from +x to +y. Near `origin` (column, row) it is most exact.
     #[inline]
-    pub(super) fn new(corners: [GridPoint; 3], origin: [i32; 2]) -> Self {
-        let [a, b, c] = corners;
-        let [p, q, r] = [center_offset(a, origin), center_offset(b, origin), center_offset(c, origin)];
-        let side = |from: GridPoint, to: GridPoint, place: DVec2| {
+    pub(super) fn new(corners: &[GridPoint], origin: [i32; 2]) -> Self {
+        let count = corners.len();
+        let mut coverage = Self { sides: [HalfPlane::new(DVec2::X, 1.0); 4], corners: [DVec2::ZERO; 4], count, origin };
+        for (i, &from) in corners.iter().enumerate() {
+            let to = corners[if i + 1 == count { 0 } else { i + 1 }];
             let (dx, dy) = ((to.x - from.x) as f64, (to.y - from.y) as f64);
-            let normal = DVec2::new(-dy, dx);
-            HalfPlane::new(normal, -normal.dot(place))
-        };
-        Self { sides: [side(a, b, p), side(b, c, q), side(c, a, r)], corners: [p, q, r], origin }
+            let (place, normal) = (center_offset(from, origin), DVec2::new(-dy, dx));
+            coverage.corners[i] = place;
+            coverage.sides[i] = HalfPlane::new(normal, -normal.dot(place));
+        }
+        coverage
     }
 
     /// The part of a pixel (column, row) that is covered.
     #[inline]
     pub(super) fn of(&self, [column, row]: [i32; 2]) -> Part {
         let step = DVec2::new(f64::from(column - self.origin[0]), f64::from(row - self.origin[1]));
-        let side =
-            |i: usize| HalfPlane { value: self.sides[i].value + self.sides[i].normal.dot(step), ..self.sides[i] };
-        let (a, b, c) = (side(0), side(1), side(2));
-        if (a.value <= -a.reach) | (b.value <= -b.reach) | (c.value <= -c.reach) {
-            return Part::NOTHING;
+        let mut cutting = [0; 4];
+        let mut cuts = 0;
+        let mut sides = self.sides;
+        for (i, side) in sides[..self.count].iter_mut().enumerate() {
+            side.value += side.normal.dot(step);
+            if side.value <= -side.reach {
+                // A side without length says nothing.
+                if side.reach > 0.0 {
+                    return Part::NOTHING;
+                }
+            } else if side.value < side.reach {
+                cutting[cuts] = i;
+                cuts += 1;
+            }
         }
-        match (a.value < a.reach, b.value < b.reach, c.value < c.reach) {
-            (false, false, false) => Part::PIXEL,
-            (true, false, false) => a.part(),
-            (false, true, false) => b.part(),
-            (false, false, true) => c.part(),
-            (true, true, false) => cut_twice(&a, &b, self.corners[1] - step),
-            (false, true, true) => cut_twice(&b, &c, self.corners[2] - step),
-            (true, false, true) => cut_twice(&c, &a, self.corners[0] - step),
-            (true, true, true) => cut([a, b, c]),
+        match cutting[..cuts] {
+            [] => Part::PIXEL,
+            [one] => sides[one].part(),
+            [one, next] if next == one + 1 => cut_twice(&sides[one], &sides[next], self.corners[next] - step),
+            [first, last] if first == 0 && last + 1 == self.count => {
+                cut_twice(&sides[last], &sides[first], self.corners[0] - step)
+            }
+            _ => cut(cutting[..cuts].iter().map(|&i| sides[i])),
         }
     }
 }
@@ -184,8 +195,8 @@ fn leave(from: DVec2, direction: DVec2) -> (DVec2, usize) {
     }
 }
 
-/// The part of a pixel within three half planes: clipped one by one (Sutherland and Hodgman 1974).
-fn cut(sides: [HalfPlane; 3]) -> Part {
+/// The part of a pixel within half planes: clipped one by one (Sutherland and Hodgman 1974).
+fn cut(sides: impl IntoIterator<Item = HalfPlane>) -> Part {
     let mut polygon = [DVec2::ZERO; MOST_CORNERS];
     polygon[..4].copy_from_slice(&CORNERS);
     let mut count = 4;
@@ -217,8 +228,8 @@ fn cut(sides: [HalfPlane; 3]) -> Part {
     }
 }
 
-/// Corners of a pixel after three cuts.
-const MOST_CORNERS: usize = 7;
+/// Corners of a pixel after four cuts.
+const MOST_CORNERS: usize = 8;
 
 #[cfg(test)]
 mod tests {
@@ -274,13 +285,13 @@ mod tests {
     #[test]
     fn parts_of_pixels_around_a_triangle() {
         let part = |area: f64, [x, y]: [f64; 2]| Part { area, moment: DVec2::new(x, y) * area };
-        let coverage = Coverage::new(triangle([[1.0, 1.0], [5.0, 1.0], [1.0, 5.0]]), [0, 0]);
+        let coverage = Coverage::new(&triangle([[1.0, 1.0], [5.0, 1.0], [1.0, 5.0]]), [0, 0]);
         assert_near(coverage.of([1, 1]), Part::PIXEL);
         assert_near(coverage.of([3, 2]), part(0.5, [-1.0 / 6.0, -1.0 / 6.0]));
         for pixel in [[0, 2], [4, 4], [2, 5]] {
             assert_near(coverage.of(pixel), Part::NOTHING);
         }
-        let within = Coverage::new(triangle([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75]]), [7, 3]);
+        let within = Coverage::new(&triangle([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75]]), [7, 3]);
         assert_near(within.of([0, 0]), part(0.125, [-1.0 / 12.0, -1.0 / 12.0]));
     }
 
@@ -296,7 +307,7 @@ mod tests {
             if !is_positive(corners) {
                 continue;
             }
-            let coverage = Coverage::new(corners, [4, 4]);
+            let coverage = Coverage::new(&corners, [4, 4]);
             let (mut area, mut moment) = (0.0, DVec2::ZERO);
             for (column, row) in (0..10).flat_map(|row| (0..10).map(move |column| (column, row))) {
                 let part = coverage.of([column, row]);

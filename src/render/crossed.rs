@@ -1,10 +1,10 @@
 //! Anti-aliasing: the pixels of a band that a boundary between labels crosses, and the mean colour of each.
 //!
-//! In: first all triangles of the band, for their boundaries ([`Crossed::mark`]); then all of them again, for what
+//! In: first all polygons of the band, for their boundaries ([`Crossed::mark`]); then all of them again, for what
 //! they cover ([`Crossed::add`]). Out: those pixels anew ([`Crossed::paint`]); no other pixel is touched.
 //!
-//! A pixel's colour is the integral over its square of all positive triangles, by the area that they cover. Areas add
-//! up to 1 but for folds, where they add up to more. Each triangle's share is clamped to [0, 255] before it is
+//! A pixel's colour is the integral over its square of all positive polygons, by the area that they cover. Areas add
+//! up to 1 but for folds, where they add up to more. Each polygon's share is clamped to [0, 255] before it is
 //! blended, as the pixels around are: what is mixed is what is seen on both sides, so the edge of an overshooting
 //! region is as soft as any other and means do not change with the size of the picture.
 
@@ -12,11 +12,11 @@ use std::ops::Range;
 
 use glam::{Vec3A, Vec4};
 
+use super::canvas::Canvas;
 use super::coverage::Coverage;
-use super::draw::Triangle;
 use super::pack::BAND_ROWS;
 use super::scan::{GRID_BITS, GridPoint, touched};
-use super::shade::{Rgb32, Shade, pack};
+use super::shade::Shade;
 use super::view::View;
 
 /// Less than this part of a pixel says nothing of its colour: it keeps that of its centre.
@@ -44,14 +44,20 @@ pub(super) struct Crossed {
 }
 
 impl Crossed {
-    /// Starts a band: marks the pixels that edges between labels cross.
-    pub(super) fn start<'a>(&mut self, view: &View, rows: Range<i32>, triangles: impl Iterator<Item = &'a Triangle>) {
+    /// Starts a band: marks the pixels that edges between labels cross, given polygons and which of their edges are (bit
+    /// i: from corner i to the next).
+    pub(super) fn start<'a>(
+        &mut self,
+        view: &View,
+        rows: Range<i32>,
+        polygons: impl Iterator<Item = (&'a [GridPoint], u8)>,
+    ) {
         self.rows = rows;
         self.columns.clear();
         self.columns.resize(view.columns as usize, 0);
-        for triangle in triangles.filter(|triangle| triangle.boundary != 0) {
-            for i in (0..3).filter(|i| triangle.boundary >> i & 1 != 0) {
-                self.mark(view, triangle.corners[i], triangle.corners[(i + 1) % 3]);
+        for (corners, boundary) in polygons.filter(|(_, boundary)| *boundary != 0) {
+            for i in (0..corners.len()).filter(|i| boundary >> i & 1 != 0) {
+                self.mark(view, corners[i], corners[(i + 1) % corners.len()]);
             }
         }
         let union = |columns: &[Rows]| columns.iter().fold(0, |union, rows| union | rows);
@@ -95,12 +101,12 @@ impl Crossed {
         }
     }
 
-    /// Adds what a triangle, whose colours are `shade`, covers of the pixels.
-    pub(super) fn add(&mut self, triangle: &Triangle, shade: &Shade) {
+    /// Adds what a polygon, whose colours are `shade`, covers of the pixels.
+    pub(super) fn add(&mut self, corners: &[GridPoint], shade: &Shade) {
         if self.sums.is_empty() {
             return;
         }
-        let Some((columns, rows)) = touched(&triangle.corners, self.columns.len() as i32, self.rows.clone()) else {
+        let Some((columns, rows)) = touched(corners, self.columns.len() as i32, self.rows.clone()) else {
             return;
         };
         let from_first = Rows::MAX << (rows.start - self.rows.start);
@@ -110,7 +116,7 @@ impl Crossed {
         if tiles.peek().is_none() {
             return;
         }
-        let coverage = Coverage::new(triangle.corners, [columns.start, rows.start]);
+        let coverage = Coverage::new(corners, [columns.start, rows.start]);
         for tile in tiles {
             let in_tile = (tile * TILE) as i32..((tile + 1) * TILE) as i32;
             for column in columns.start.max(in_tile.start)..columns.end.min(in_tile.end) {
@@ -131,17 +137,25 @@ impl Crossed {
     }
 
     /// Paints the pixels into the band's rows.
-    pub(super) fn paint(&self, pixels: &mut [Rgb32]) {
-        let mut sums = self.sums.iter();
-        for (column, rows) in self.columns.iter().enumerate() {
-            let mut left = *rows;
-            while left != 0 {
-                let row = left.trailing_zeros() as usize;
-                left &= left - 1;
-                if let Some(sum) = sums.next().filter(|sum| sum.w > LEAST_AREA) {
-                    pixels[row * self.columns.len() + column] = pack(Vec3A::from_vec4(*sum) / sum.w);
-                }
+    pub(super) fn paint(&self, canvas: &mut Canvas) {
+        for ([column, row], sum) in self.places().zip(&self.sums) {
+            if sum.w > LEAST_AREA {
+                canvas.set(column, row, Vec3A::from_vec4(*sum) / sum.w);
             }
         }
+    }
+
+    /// Column and row within the band of each marked pixel, in the order of their sums.
+    pub(super) fn places(&self) -> impl Iterator<Item = [usize; 2]> {
+        self.columns.iter().enumerate().flat_map(|(column, &rows)| {
+            let mut left = rows;
+            std::iter::from_fn(move || {
+                let row = left.trailing_zeros() as usize;
+                (left != 0).then(|| {
+                    left &= left - 1;
+                    [column, row]
+                })
+            })
+        })
     }
 }

@@ -5,71 +5,151 @@
 //! sign, as the box stays in place under subdivision; so each pixel has a polygon that was not turned over, and the
 //! last of them is shown.
 
-use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use glam::Vec3;
 
+use super::canvas::{Canvas, ColorSpace};
 use super::crossed::Crossed;
-use super::pack::{BAND_ROWS, bands};
-use super::parallel::for_each;
-use super::scan::{GridPoint, bounds, is_positive, scan, touched};
+use super::pack::{BAND_ROWS, Band, bands};
+use super::parallel::{List, for_each};
+use super::scan::{GridPoint, bounds, scan, touched, turn};
 use super::scene::{CHUNK, Polygon, Scene};
-use super::shade::{Rgb32, Shade};
+use super::shade::{Run, Shade};
 use super::view::{View, Viewport, ViewportError, plane};
 use crate::mesh::TetMesh;
 use crate::video::Surface;
 
-/// A part of a slice on its way to pixels.
+/// A part of a slice on the surface's grid.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Triangle {
-    pub(super) corners: [GridPoint; 3],
-    pub(super) colors: [Vec3; 3],
+pub(super) struct Patch {
+    pub(super) corners: [GridPoint; 4],
+    /// RGB levels, one a corner. They are linear: the first three say all.
+    pub(super) colors: [Vec3; 4],
+    /// 3 or 4.
+    count: u8,
     /// Edges that lie between labels; bit i: the edge from corner i to the next.
+    boundary: u8,
+}
+
+impl Patch {
+    /// A triangle that is known to turn from +x to +y.
+    pub(super) fn triangle([a, b, c]: [GridPoint; 3], colors: [Vec3; 3], boundary: u8) -> Self {
+        Self { corners: [a, b, c, c], colors: [colors[0], colors[1], colors[2], colors[2]], count: 3, boundary }
+    }
+
+    /// A polygon of a slice.
+    #[inline]
+    fn new(view: &View, polygon: Polygon<'_>) -> Self {
+        let count = polygon.corners.len() as u8;
+        let (corners, colors) = ([GridPoint::default(); 4], [Vec3::ZERO; 4]);
+        let mut patch = Self { corners, colors, count, boundary: polygon.boundary };
+        for (i, (place, color)) in polygon.corners.iter().enumerate() {
+            patch.corners[i] = view.grid(place.x, place.y);
+            patch.colors[i] = *color;
+        }
+        patch
+    }
+
+    /// The corners in order.
+    #[inline]
+    pub(super) fn corners(&self) -> &[GridPoint] {
+        &self.corners[..self.count.into()]
+    }
+
+    /// The same quad from its third corner on.
+    fn turned(self) -> Self {
+        let ([a, b, c, d], [p, q, r, s]) = (self.corners, self.colors);
+        let boundary = (self.boundary >> 2 | self.boundary << 2) & 0b1111;
+        Self { corners: [c, d, a, b], colors: [r, s, p, q], count: self.count, boundary }
+    }
+
+    /// Hands out the patch whole where it is convex, else the halves of it that are positive: rounding bends slivers.
+    /// Of what smoothing turned over nothing is left. The first three corners of a quad are its larger half.
+    #[inline]
+    fn convex(self, mut take: impl FnMut(Self)) {
+        let [a, b, c, d] = self.corners;
+        if self.count == 3 {
+            if turn([a, b, c]) > 0 {
+                take(self);
+            }
+            return;
+        }
+        let halves = [turn([a, b, c]), turn([a, c, d])];
+        if halves[0] >= 0 && halves[1] >= 0 && halves != [0, 0] && turn([b, c, d]) >= 0 && turn([d, a, b]) >= 0 {
+            return take(if halves[0] >= halves[1] { self } else { self.turned() });
+        }
+        let [p, q, r, s] = self.colors;
+        let edge = |i: u8| self.boundary >> i & 1;
+        // The diagonal of a quad is no edge of it.
+        if halves[0] > 0 {
+            take(Self::triangle([a, b, c], [p, q, r], edge(0) | edge(1) << 1));
+        }
+        if halves[1] > 0 {
+            take(Self::triangle([a, c, d], [p, r, s], edge(2) << 1 | edge(3) << 2));
+        }
+    }
+}
+
+/// A convex polygon that turns from +x to +y, ready to be painted; two lines of the cache.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+pub(super) struct Piece {
+    corners: [GridPoint; 4],
+    run: Run,
+    /// Rows of the surface in which it counts.
+    first_row: i32,
+    end_row: i32,
+    /// 3 or 4.
+    count: u8,
+    /// As of [`Patch`].
     pub(super) boundary: u8,
 }
 
-impl Triangle {
-    /// Rows in which the triangle's bounds hold a pixel centre of the surface, if it is positive and there are any.
+impl Piece {
+    /// The corners in order.
     #[inline]
-    pub(super) fn rows(&self, view: &View) -> Option<Range<i32>> {
-        let rows = bounds(&self.corners, view.columns, view.rows)?;
-        is_positive(self.corners).then_some(rows)
-    }
-
-    /// Rows of the surface that the triangle's bounds touch, if it is positive and there are any.
-    #[inline]
-    fn touched_rows(&self, view: &View) -> Option<Range<i32>> {
-        let (_, rows) = touched(&self.corners, view.columns, 0..view.rows)?;
-        is_positive(self.corners).then_some(rows)
+    pub(super) fn corners(&self) -> &[GridPoint] {
+        &self.corners[..self.count.into()]
     }
 }
 
-/// A triangle and the rows in which it counts.
-pub(super) type Placed = (Range<i32>, Triangle);
+/// Pieces in the order of painting, and for anti-aliasing the shade of each.
+#[derive(Debug, Default)]
+pub(super) struct Pieces {
+    pieces: Vec<Piece>,
+    shades: Vec<Shade>,
+}
 
-/// Cuts a slice's polygon into triangles on the surface's grid. A quad is always cut from
-/// its first corner: both halves lie in one linear field.
-#[inline]
-pub(super) fn triangulate(view: &View, polygon: Polygon<'_>, mut triangle: impl FnMut(Triangle, [usize; 3])) {
-    let mut grid = [GridPoint::default(); 4];
-    for (grid, (place, _)) in grid.iter_mut().zip(polygon.corners) {
-        *grid = view.grid(place.x, place.y);
+impl List for Pieces {
+    fn clear(&mut self) {
+        self.pieces.clear();
+        self.shades.clear();
     }
-    let count = polygon.corners.len();
-    for i in 2..count {
-        let last = count - 1;
-        let ends = [0, i - 1, i];
-        // The diagonal of a quad is no edge of it.
-        let outer = u8::from(i == 2) | 2 | u8::from(i == last) << 2;
-        let edge = |k: usize| polygon.boundary >> k & 1;
-        triangle(
-            Triangle {
-                corners: ends.map(|k| grid[k]),
-                colors: ends.map(|k| polygon.corners[k].1),
-                boundary: outer & (edge(0) | edge(i - 1) << 1 | edge(last) << 2),
-            },
-            ends,
-        );
+}
+
+impl Pieces {
+    /// Appends what of a patch is seen.
+    #[inline]
+    fn push(&mut self, view: &View, space: ColorSpace, antialias: bool, patch: &Patch) {
+        let corners = patch.corners();
+        let seen = if antialias {
+            touched(corners, view.columns, 0..view.rows)
+        } else {
+            bounds(corners, view.columns, view.rows)
+        };
+        let Some((columns, rows)) = seen else { return };
+        self.pieces.push(Piece {
+            corners: patch.corners,
+            run: Run::new(patch, space, [columns.start, rows.start], columns.len() as u32),
+            first_row: rows.start,
+            end_row: rows.end,
+            count: patch.count,
+            boundary: patch.boundary,
+        });
+        if antialias {
+            self.shades.push(Shade::new(patch));
+        }
     }
 }
 
@@ -83,6 +163,9 @@ pub struct DrawParams {
     pub antialias: bool,
     /// The part of the picture to draw; `None`: the whole.
     pub viewport: Option<Viewport>,
+    /// Whether the control mesh's cross-section is drawn over the picture, as lines that are lighter or darker than
+    /// what they cross.
+    pub mesh: bool,
 }
 
 impl Scene {
@@ -97,17 +180,18 @@ impl Scene {
         let view = View::new(self.domain(), viewport, (surface.width(), surface.height()));
         let t = plane(self.domain(), frame);
         let antialias = params.antialias && self.find_interfaces();
-        let mut lists = std::mem::take(&mut self.triangles);
+        let space = ColorSpace::of(surface.format(), surface.matrix());
+        let mut lists = std::mem::take(&mut self.pieces);
         self.cut(t, params.levels, &mut lists, |list, _, polygon| {
-            triangulate(&view, polygon, |triangle, _| {
-                let rows = if antialias { triangle.touched_rows(&view) } else { triangle.rows(&view) };
-                if let Some(rows) = rows {
-                    list.push((rows, triangle));
-                }
-            });
+            Patch::new(&view, polygon).convex(|patch| list.push(&view, space, antialias, &patch));
         });
-        fill(&lists, &view, antialias, surface);
-        self.triangles = lists;
+        let mut outlines: Vec<Vec<Patch>> = Vec::new();
+        if params.mesh {
+            self.cut(t, 0, &mut outlines, |list, _, polygon| list.push(Patch::new(&view, polygon)));
+        }
+        let picture = Picture { view: &view, antialias, lists: &lists, outlines: &outlines };
+        picture.fill(&self.painters, surface);
+        self.pieces = lists;
         Ok(())
     }
 }
@@ -122,57 +206,105 @@ pub fn draw(mesh: &TetMesh, frame: f64, params: &DrawParams, surface: &mut Surfa
     scene.draw(frame, params, surface)
 }
 
-/// Paints all bands.
-fn fill(lists: &[Vec<Placed>], view: &View, antialias: bool, surface: &mut Surface<'_>) {
-    let by_band = BandTable::new(lists, view.rows as usize);
-    let width = view.columns as usize;
-    for_each(bands(surface), |(pixels, crossed): &mut (Vec<Rgb32>, Crossed), mut band| {
-        let rows = band.rows();
-        let names = by_band.row(band.index()).iter();
-        let triangles = names.map(|&name| &lists[(name >> NAME_BITS) as usize][name as usize & ((1 << NAME_BITS) - 1)]);
-        if antialias {
-            crossed.start(view, rows.clone(), triangles.clone().map(|(_, triangle)| triangle));
-        }
-        pixels.clear();
-        pixels.resize(width * rows.len(), 0);
-        for (own, triangle) in triangles {
-            let both = own.start.max(rows.start)..own.end.min(rows.end);
-            let shade = Shade::new(triangle.corners, triangle.colors);
-            scan(triangle.corners, both, |row, columns| {
-                let columns = columns.start.max(0) as usize..columns.end.clamp(0, width as i64) as usize;
-                if !columns.is_empty() {
-                    let start = (row - rows.start) as usize * width;
-                    shade.paint(&mut pixels[start..start + width], row, columns);
-                }
-            });
-            if antialias {
-                crossed.add(triangle, &shade);
-            }
-        }
-        if antialias {
-            crossed.paint(pixels);
-        }
-        band.pack(pixels);
-    });
+/// What a band is painted with; reused from band to band and from picture to picture.
+#[derive(Debug)]
+struct Painter {
+    canvas: Canvas,
+    crossed: Crossed,
 }
 
-/// Low bits of a triangle's name: its place in its list; the others number the list.
+/// Painters that no thread is using.
+#[derive(Debug, Default)]
+pub(super) struct Painters(Mutex<Vec<Painter>>);
+
+impl Painters {
+    fn with(&self, work: impl FnOnce(&mut Painter)) {
+        let free = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut painter = free.unwrap_or_else(|| Painter { canvas: Canvas::new(), crossed: Crossed::default() });
+        work(&mut painter);
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(painter);
+    }
+}
+
+/// All that is painted.
+struct Picture<'a> {
+    view: &'a View,
+    antialias: bool,
+    lists: &'a [Pieces],
+    /// Polygons whose edges are drawn over the rest.
+    outlines: &'a [Vec<Patch>],
+}
+
+impl<'a> Picture<'a> {
+    /// Paints all bands.
+    fn fill(&self, painters: &Painters, surface: &mut Surface<'_>) {
+        let by_band = BandTable::new(self.lists, self.view.rows as usize);
+        for_each(bands(surface), |mut band| {
+            let names = by_band.row(band.index());
+            painters.with(|painter| painter.paint(self, names, &mut band));
+        });
+    }
+
+    fn named(&self, names: &'a [u32]) -> impl Iterator<Item = (&'a Pieces, usize)> {
+        let lists = self.lists;
+        names.iter().map(move |&name| (&lists[(name >> NAME_BITS) as usize], name as usize & ((1 << NAME_BITS) - 1)))
+    }
+}
+
+impl Painter {
+    /// Paints a band, which the named pieces touch.
+    fn paint<'a>(&mut self, picture: &Picture<'a>, names: &'a [u32], band: &mut Band<'_>) {
+        let Self { canvas, crossed } = self;
+        let (rows, width) = (band.rows(), picture.view.columns as usize);
+        let space = band.space();
+        canvas.start(space, width, rows.len());
+        for (list, place) in picture.named(names) {
+            let piece = &list.pieces[place];
+            let both = piece.first_row.max(rows.start)..piece.end_row.min(rows.end);
+            let brush = piece.run.brush(space);
+            scan(piece.corners(), both, |row, columns| {
+                let columns = columns.start.max(0) as usize..columns.end.clamp(0, width as i64) as usize;
+                if !columns.is_empty() {
+                    brush.paint(canvas.row_mut((row - rows.start) as usize), row, columns);
+                }
+            });
+        }
+        if picture.antialias {
+            let pieces = picture.named(names).map(|(list, place)| &list.pieces[place]);
+            crossed.start(picture.view, rows.clone(), pieces.map(|piece| (piece.corners(), piece.boundary)));
+            for (list, place) in picture.named(names) {
+                crossed.add(list.pieces[place].corners(), &list.shades[place]);
+            }
+            crossed.paint(canvas);
+        }
+        if !picture.outlines.is_empty() {
+            const ALL_EDGES: u8 = 0b1111;
+            let outlines = picture.outlines.iter().flatten().map(|patch| (patch.corners(), ALL_EDGES));
+            crossed.start(picture.view, rows, outlines);
+            crossed.places().for_each(|[column, row]| canvas.set_apart(column, row));
+        }
+        band.pack(canvas);
+    }
+}
+
+/// Low bits of a polygon's name: its place in its list; the others number the list.
 const NAME_BITS: u32 = 14;
 // A tet has up to eight children in the slice, each cut into up to two triangles.
 const _: () = assert!(CHUNK * 16 <= 1 << NAME_BITS);
 
-/// Names of the triangles that touch each band, ascending, as compressed rows.
+/// Names of the polygons that touch each band, ascending, as compressed rows.
 struct BandTable {
     start: Vec<u32>,
     names: Vec<u32>,
 }
 
 impl BandTable {
-    fn new(lists: &[Vec<Placed>], rows: usize) -> Self {
-        let bands_of = |rows: &Range<i32>| rows.start as usize / BAND_ROWS..(rows.end as usize - 1) / BAND_ROWS + 1;
+    fn new(lists: &[Pieces], rows: usize) -> Self {
+        let bands_of =
+            |piece: &Piece| piece.first_row as usize / BAND_ROWS..(piece.end_row as usize - 1) / BAND_ROWS + 1;
         let mut start = vec![0u32; rows.div_ceil(BAND_ROWS) + 1];
-        for (rows, _) in lists.iter().flatten() {
-            bands_of(rows).for_each(|band| start[band + 1] += 1);
+        for piece in lists.iter().flat_map(|list| &list.pieces) {
+            bands_of(piece).for_each(|band| start[band + 1] += 1);
         }
         for band in 1..start.len() {
             start[band] += start[band - 1];
@@ -180,8 +312,8 @@ impl BandTable {
         let mut next = start.clone();
         let mut names = vec![0; start[start.len() - 1] as usize];
         for (number, list) in lists.iter().enumerate() {
-            for (place, (rows, _)) in list.iter().enumerate() {
-                for band in bands_of(rows) {
+            for (place, piece) in list.pieces.iter().enumerate() {
+                for band in bands_of(piece) {
                     names[next[band] as usize] = (number << NAME_BITS | place) as u32;
                     next[band] += 1;
                 }

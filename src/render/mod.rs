@@ -1,7 +1,7 @@
 //! From a slab's control mesh to pixels: subdivide, slice at a time, fill, pack into the pixel format.
 //!
 //! ```text
-//! complex -> rings -> level | refiner -> slice -> scan, shade -> crossed -> pack
+//! complex -> rings -> level | refiner -> slice -> scan, shade -> canvas -> crossed -> pack
 //! ```
 //!
 //! In: a mesh, a time, a size. Out: pixels; for the fit also masks ([`color_masks`], [`position_masks`]) and where
@@ -9,6 +9,8 @@
 //!
 //! Forbidden here: coding, files, clocks; anything that makes pixels depend on the number of threads.
 
+mod active;
+mod canvas;
 mod children;
 mod complex;
 mod coverage;

@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use super::shade::Rgb32;
-use crate::video::{PixelFormat, Surface, YuvMatrix, rgb_to_yuv};
+use super::canvas::{Canvas, ColorSpace};
+use crate::video::{PixelFormat, Surface};
 
-/// Rows that are painted together: at 3840 pixels a row half a megabyte, which stays in the second-level cache. Even,
+/// Rows that are painted together: at 3840 pixels a row 370 kB, which stay in the second-level cache. Even,
 /// so that rows that share chroma stay together.
 pub(super) const BAND_ROWS: usize = 32;
 
@@ -15,7 +15,7 @@ pub(super) struct Band<'a> {
     rows: Range<i32>,
     width: usize,
     format: PixelFormat,
-    matrix: YuvMatrix,
+    space: ColorSpace,
     /// The band's bytes in each plane, and the plane's stride.
     planes: Vec<(&'a mut [u8], usize)>,
 }
@@ -23,11 +23,12 @@ pub(super) struct Band<'a> {
 /// Cuts a surface into bands, top to bottom.
 pub(super) fn bands<'a>(surface: &'a mut Surface<'_>) -> Vec<Band<'a>> {
     let (width, height) = (surface.width() as usize, surface.height() as usize);
-    let (format, matrix) = (surface.format(), surface.matrix());
+    let format = surface.format();
+    let space = ColorSpace::of(format, surface.matrix());
     let mut bands: Vec<Band<'a>> = (0..height.div_ceil(BAND_ROWS))
         .map(|index| {
             let rows = (index * BAND_ROWS) as i32..((index + 1) * BAND_ROWS).min(height) as i32;
-            Band { index, rows, width, format, matrix, planes: Vec::new() }
+            Band { index, rows, width, format, space, planes: Vec::new() }
         })
         .collect();
     for (number, plane) in surface.planes_mut().iter_mut().enumerate() {
@@ -45,65 +46,89 @@ impl Band<'_> {
         self.index
     }
 
+    /// What it is to be painted in.
+    pub(super) fn space(&self) -> ColorSpace {
+        self.space
+    }
+
     /// Its rows on the surface.
     pub(super) fn rows(&self) -> Range<i32> {
         self.rows.clone()
     }
 
-    /// Writes `pixels`, the band's rows without padding. Unused bytes of 4-byte formats become 255.
-    pub(super) fn pack(&mut self, pixels: &[Rgb32]) {
+    /// Writes the band's rows. Unused bytes of 4-byte formats become 255.
+    pub(super) fn pack(&mut self, canvas: &Canvas) {
         match self.format {
-            PixelFormat::Rgb => self.pack_rows(pixels, |[r, g, b]| [r, g, b]),
-            PixelFormat::Rgbx => self.pack_rows(pixels, |[r, g, b]| [r, g, b, 255]),
-            PixelFormat::Bgrx => self.pack_rows(pixels, |[r, g, b]| [b, g, r, 255]),
+            PixelFormat::Rgb => self.pack_rows(canvas, |r, g, b| [r, g, b]),
+            PixelFormat::Rgbx => self.pack_rows(canvas, |r, g, b| [r, g, b, 255]),
+            PixelFormat::Bgrx => self.pack_rows(canvas, |r, g, b| [b, g, r, 255]),
             PixelFormat::I420 | PixelFormat::Nv12 => {
-                let matrix = self.matrix;
-                self.pack_rows(pixels, |rgb| [rgb_to_yuv(matrix, rgb.map(i32::from), 1)[0]]);
-                self.pack_chroma(pixels);
+                let (luma, stride) = &mut self.planes[0];
+                for (row, bytes) in luma.chunks_mut(*stride).enumerate() {
+                    bytes[..self.width].copy_from_slice(canvas.row(row, 0));
+                }
+                self.pack_chroma(canvas);
             }
         }
     }
 
-    /// Writes the first plane.
-    fn pack_rows<const N: usize>(&mut self, pixels: &[Rgb32], layout: impl Fn([u8; 3]) -> [u8; N]) {
+    /// Writes the only plane.
+    fn pack_rows<const N: usize>(&mut self, canvas: &Canvas, layout: impl Fn(u8, u8, u8) -> [u8; N]) {
         let (bytes, stride) = &mut self.planes[0];
-        for (row, pixels) in bytes.chunks_mut(*stride).zip(pixels.chunks_exact(self.width)) {
-            for (bytes, &pixel) in row.chunks_exact_mut(N).zip(pixels) {
-                bytes.copy_from_slice(&layout(channels(pixel)));
+        for (row, bytes) in bytes.chunks_mut(*stride).enumerate() {
+            let [r, g, b] = [0, 1, 2].map(|channel| canvas.row(row, channel));
+            let (pixels, _) = bytes[..N * self.width].as_chunks_mut::<N>();
+            for (((pixel, &r), &g), &b) in pixels.iter_mut().zip(r).zip(g).zip(b) {
+                *pixel = layout(r, g, b);
             }
         }
     }
 
     /// Writes U and V: at even columns, halfway between two rows, as MPEG-2 and its heirs site them. So a sample is
     /// the mean of two rows and of columns weighted 1, 2, 1.
-    fn pack_chroma(&mut self, pixels: &[Rgb32]) {
-        let (width, matrix, interleaved) = (self.width, self.matrix, self.format == PixelFormat::Nv12);
-        let (_, chroma) = self.planes.split_at_mut(1);
-        let stride = chroma[0].1;
-        for (pair, rows) in pixels.chunks(2 * width).enumerate() {
-            // An odd last row stands for both.
-            let (upper, lower) = (&rows[..width], &rows[rows.len() - width..]);
-            for i in 0..width.div_ceil(2) {
-                let columns = [(2 * i).saturating_sub(1), 2 * i, 2 * i, (2 * i + 1).min(width - 1)];
-                let mut sum = [0; 3];
-                for pixel in columns.into_iter().flat_map(|x| [upper[x], lower[x]]) {
-                    sum.iter_mut().zip(channels(pixel)).for_each(|(sum, v)| *sum += i32::from(v));
-                }
-                let [_, u, v] = rgb_to_yuv(matrix, sum, 8);
+    fn pack_chroma(&mut self, canvas: &Canvas) {
+        let (rows, samples) = (self.rows.len(), self.width.div_ceil(2));
+        let interleaved = self.format == PixelFormat::Nv12;
+        for channel in [1, 2] {
+            let (bytes, stride) = &mut self.planes[if interleaved { 1 } else { channel }];
+            for (pair, bytes) in bytes.chunks_mut(*stride).enumerate() {
+                // An odd last row stands for both.
+                let rows = [2 * pair, (2 * pair + 1).min(rows - 1)].map(|row| canvas.row(row, channel));
                 if interleaved {
-                    chroma[0].0[pair * stride + 2 * i] = u;
-                    chroma[0].0[pair * stride + 2 * i + 1] = v;
+                    let (places, _) = bytes[..2 * samples].as_chunks_mut::<2>();
+                    halve(rows, places, |place, sample| place[channel - 1] = sample);
                 } else {
-                    chroma[0].0[pair * stride + i] = u;
-                    let stride = chroma[1].1;
-                    chroma[1].0[pair * stride + i] = v;
+                    halve(rows, &mut bytes[..samples], |place, sample| *place = sample);
                 }
             }
         }
     }
 }
 
-fn channels(pixel: Rgb32) -> [u8; 3] {
-    let [r, g, b, _] = pixel.to_le_bytes();
-    [r, g, b]
+/// Makes one row of half the width from two, sample by sample.
+#[inline]
+fn halve<P>(rows: [&[u8]; 2], places: &mut [P], put: impl Fn(&mut P, u8)) {
+    let width = rows[0].len();
+    let sum = |before: u16, here: u16, after: u16| before + 2 * here + after;
+    let mean = |sum: u16| ((sum + 4) >> 3) as u8;
+    // Pairs of bytes as numbers of 16 bits are what vector units take apart fastest: the lower half is the first byte.
+    let [[upper, lower], [upper_before, lower_before]] = [2, 1].map(|from| rows.map(|row| pairs(row, from)));
+    let inner = places.iter_mut().skip(1).zip(upper.zip(lower)).zip(upper_before.zip(lower_before));
+    inner.for_each(|((place, (upper, lower)), (upper_before, lower_before))| {
+        let row = |before: u16, pair: u16| sum(before & 255, pair & 255, pair >> 8);
+        put(place, mean(row(upper_before, upper) + row(lower_before, lower)));
+    });
+    // Beyond the ends of a row its outermost columns stand in.
+    let edge = |before: usize, here: usize, after: usize| {
+        mean(rows.map(|row| sum(row[before].into(), row[here].into(), row[after].into())).iter().sum())
+    };
+    put(&mut places[0], edge(0, 0, 1.min(width - 1)));
+    if width % 2 == 1 && width > 1 {
+        put(&mut places[width / 2], edge(width - 2, width - 1, width - 1));
+    }
+}
+
+/// A row's columns two by two, from a column on.
+fn pairs(row: &[u8], from: usize) -> impl Iterator<Item = u16> {
+    row.get(from..).unwrap_or_default().as_chunks::<2>().0.iter().map(|&pair| u16::from_le_bytes(pair))
 }

@@ -19,16 +19,28 @@ pub(super) fn map_chunks<R: Send>(count: usize, chunk: usize, map: impl Fn(Range
     }
 }
 
+/// What a thread fills, reused from call to call.
+pub(super) trait List: Default + Send {
+    /// Empties it, but keeps its memory.
+    fn clear(&mut self);
+}
+
+impl<T: Send> List for Vec<T> {
+    fn clear(&mut self) {
+        self.clear();
+    }
+}
+
 /// Splits `0..count` into runs of `chunk` and fills one list for each. `lists` keep their memory from call to call, and
 /// come out as many as there are runs.
-pub(super) fn fill_chunks<T: Send>(
-    lists: &mut Vec<Vec<T>>,
+pub(super) fn fill_chunks<L: List>(
+    lists: &mut Vec<L>,
     count: usize,
     chunk: usize,
-    fill: impl Fn(&mut Vec<T>, Range<usize>) + Sync + Send,
+    fill: impl Fn(&mut L, Range<usize>) + Sync + Send,
 ) {
-    lists.resize_with(count.div_ceil(chunk), Vec::new);
-    let run = |(i, list): (usize, &mut Vec<T>)| {
+    lists.resize_with(count.div_ceil(chunk), L::default);
+    let run = |(i, list): (usize, &mut L)| {
         list.clear();
         fill(list, i * chunk..((i + 1) * chunk).min(count));
     };
@@ -41,16 +53,13 @@ pub(super) fn fill_chunks<T: Send>(
     lists.iter_mut().enumerate().for_each(run);
 }
 
-/// Does `work` on each item, in any order and on any thread. Scratch is handed from item to item with what it holds.
-pub(super) fn for_each<T: Send, S: Default>(items: Vec<T>, work: impl Fn(&mut S, T) + Sync + Send) {
+/// Does `work` on each item, in any order and on any thread.
+pub(super) fn for_each<T: Send>(items: Vec<T>, work: impl Fn(T) + Sync + Send) {
     #[cfg(feature = "threads")]
     {
         use rayon::prelude::*;
-        items.into_par_iter().for_each_init(S::default, |scratch, item| work(scratch, item));
+        items.into_par_iter().for_each(work);
     }
     #[cfg(not(feature = "threads"))]
-    {
-        let mut scratch = S::default();
-        items.into_iter().for_each(|item| work(&mut scratch, item));
-    }
+    items.into_iter().for_each(work);
 }

@@ -19,8 +19,9 @@ const CHUNK: usize = 512;
 /// neither on how the mesh is numbered nor on what was drawn before.
 pub(super) const COLOR_BITS: u32 = 16;
 
-/// A fine node with all that drawing needs.
+/// A fine node with all that drawing needs, in one piece of memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(align(32))]
 pub(super) struct FineNode {
     /// In fine units.
     pub(super) position: IVec3,
@@ -75,6 +76,18 @@ impl Span {
     /// The times of these positions.
     pub(super) fn of(positions: impl IntoIterator<Item = IVec3>) -> Self {
         positions.into_iter().fold(Self::EMPTY, |span, p| span.hull(Self { low: p.z, high: p.z }))
+    }
+
+    /// From `low` to `high`.
+    #[cfg(test)]
+    pub(super) fn new(low: i32, high: i32) -> Self {
+        Self { low, high }
+    }
+
+    /// The earliest time.
+    #[inline]
+    pub(super) fn low(self) -> i32 {
+        self.low
     }
 
     /// The smallest range that holds both.

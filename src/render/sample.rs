@@ -4,9 +4,7 @@ use std::ops::Range;
 
 use glam::IVec3;
 
-use super::draw::triangulate;
-use super::scan::{GridPoint, scan};
-use super::scene::Polygon;
+use super::scan::{GridPoint, bounds, is_positive, scan};
 use super::slice::{SLICES, above, cross};
 use super::subdivide::Refined;
 use super::view::{View, Viewport, plane};
@@ -46,22 +44,27 @@ pub fn sample(refined: &Refined, domain: &Domain, frame: f64, rows: Range<u32>) 
     samples
 }
 
-/// Calls `pixel(row, column, weights)` for each centre in a tet's slice.
+/// Calls `pixel(row, column, weights)` for each centre in a tet's slice. A quad is cut into two triangles, which
+/// together cover what it covers.
 fn sample_tet(tet: [IVec3; 4], t: i32, view: &View, rows: Range<i32>, mut pixel: impl FnMut(i32, usize, [f32; 4])) {
     let ends = SLICES[above(tet, t)];
-    let mut polygon = [Default::default(); 4];
+    let mut grid = [GridPoint::default(); 4];
     let mut parts = [0.0; 4];
     for (i, &[below, above]) in ends.iter().enumerate() {
         let (part, place) = cross(tet[below as usize], tet[above as usize], t);
         parts[i] = part;
-        polygon[i] = (place, glam::Vec3::ZERO);
+        grid[i] = view.grid(place.x, place.y);
     }
-    triangulate(view, Polygon { corners: &polygon[..ends.len()], boundary: 0 }, |triangle, picked| {
-        let Some(own) = triangle.rows(view) else { return };
+    for last in 2..ends.len() {
+        let picked = [0, last - 1, last];
+        let triangle = picked.map(|corner| grid[corner]);
+        let Some((_, own)) = bounds(&triangle, view.columns, view.rows).filter(|_| is_positive(triangle)) else {
+            continue;
+        };
         let both = own.start.max(rows.start)..own.end.min(rows.end);
-        scan(triangle.corners, both, |row, columns| {
+        scan(&triangle, both, |row, columns| {
             for column in columns.start.max(0)..columns.end.min(i64::from(view.columns)) {
-                let share = planar_weights(triangle.corners, [column as f64 + 0.5, f64::from(row) + 0.5]);
+                let share = planar_weights(triangle, [column as f64 + 0.5, f64::from(row) + 0.5]);
                 let mut weights = [0.0f64; 4];
                 for (share, &corner) in share.into_iter().zip(&picked) {
                     let [below, above] = ends[corner];
@@ -71,7 +74,7 @@ fn sample_tet(tet: [IVec3; 4], t: i32, view: &View, rows: Range<i32>, mut pixel:
                 pixel(row, column as usize, weights.map(|w| w as f32));
             }
         });
-    });
+    }
 }
 
 /// Barycentric weights of a place (pixels) in a positive triangle; rounding is not let out of [0, 1].

@@ -1,8 +1,8 @@
-//! Which pixel centres a triangle covers, exactly.
+//! Which pixel centres a convex polygon covers, exactly.
 //!
-//! In: corners on a fixed-point grid. Out: spans of pixels. A centre on an edge belongs to the triangle below or to
+//! In: corners on a fixed-point grid. Out: spans of pixels. A centre on an edge belongs to the polygon below or to
 //! the right of it. The column at which an edge crosses a row is a function of the edge alone, always computed from its
-//! upper end; so triangles that share an edge leave no hole along it and draw no pixel twice.
+//! upper end; so polygons that share an edge leave no hole along it and draw no pixel twice.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ pub(super) const GRID_BITS: u32 = 20;
 
 const ONE: i64 = 1 << GRID_BITS;
 const HALF: i64 = ONE / 2;
-/// Below this, products of two differences and the carries on top of them fit 64 bits.
+/// Below this, the difference of two products fits 64 bits.
 const NARROW: i64 = 1 << 31;
 
 /// A position on a surface in multiples of 2^-[`GRID_BITS`] px, within +-2^60.
@@ -55,129 +55,205 @@ pub(super) fn center_offset(point: GridPoint, [column, row]: [i32; 2]) -> DVec2 
 
 /// Whether the corners turn from +x to +y, as slices of positive tets do; false if they are in line.
 #[inline]
-pub(super) fn is_positive([a, b, c]: [GridPoint; 3]) -> bool {
+pub(super) fn is_positive(corners: [GridPoint; 3]) -> bool {
+    turn(corners) > 0
+}
+
+/// Twice the area of a triangle in units of the grid, positive if it turns from +x to +y; saturated at the ends of 64
+/// bits.
+#[inline]
+pub(super) fn turn([a, b, c]: [GridPoint; 3]) -> i64 {
     let [ux, uy, vx, vy] = [b.x - a.x, b.y - a.y, c.x - a.x, c.y - a.y];
     if [ux, uy, vx, vy].iter().all(|d| d.abs() < NARROW) {
-        ux * vy - uy * vx > 0
+        ux * vy - uy * vx
     } else {
-        let [ux, uy, vx, vy] = [ux, uy, vx, vy].map(i128::from);
-        ux * vy - uy * vx > 0
+        wide_turn([ux, uy], [vx, vy]).clamp(i64::MIN.into(), i64::MAX.into()) as i64
     }
 }
 
-/// Rows and columns of centres within the triangle's bounds, cut to a surface of this size; `None` if there are none.
+/// Twice the area of a triangle in pixels, exact before it is rounded.
 #[inline]
-pub(super) fn bounds(corners: &[GridPoint; 3], columns: i32, rows: i32) -> Option<Range<i32>> {
-    let cut = |values: [i64; 3], size: i32| {
-        let first = first_center(values[0].min(values[1]).min(values[2])).max(0);
-        let end = first_center(values[0].max(values[1]).max(values[2])).min(i64::from(size));
-        (first < end).then_some(first as i32..end as i32)
-    };
-    cut(corners.map(|c| c.x), columns)?;
-    cut(corners.map(|c| c.y), rows)
+pub(super) fn double_area([a, b, c]: [GridPoint; 3]) -> f64 {
+    const PIXELS: f64 = 1.0 / (1u64 << (2 * GRID_BITS)) as f64;
+    match turn([a, b, c]) {
+        i64::MIN | i64::MAX => wide_turn([b.x - a.x, b.y - a.y], [c.x - a.x, c.y - a.y]) as f64 * PIXELS,
+        exact => exact as f64 * PIXELS,
+    }
 }
 
-/// Columns (below `columns`) and rows (among `rows`) of pixels that the triangle's bounds touch; `None` if there are
+#[cold]
+fn wide_turn(u: [i64; 2], v: [i64; 2]) -> i128 {
+    let ([ux, uy], [vx, vy]) = (u.map(i128::from), v.map(i128::from));
+    ux * vy - uy * vx
+}
+
+/// Rows and columns of centres within the polygon's bounds, cut to a surface of this size; `None` if there are none.
+#[inline]
+pub(super) fn bounds(corners: &[GridPoint], columns: i32, rows: i32) -> Option<(Range<i32>, Range<i32>)> {
+    let (low, high) = hull(corners);
+    let cut = |low: i64, high: i64, size: i32| {
+        let first = first_center(low).max(0);
+        let end = first_center(high).min(i64::from(size));
+        (first < end).then_some(first as i32..end as i32)
+    };
+    cut(low.x, high.x, columns).zip(cut(low.y, high.y, rows))
+}
+
+/// Columns (below `columns`) and rows (among `rows`) of pixels that the polygon's bounds touch; `None` if there are
 /// none.
 #[inline]
-pub(super) fn touched(corners: &[GridPoint; 3], columns: i32, rows: Range<i32>) -> Option<(Range<i32>, Range<i32>)> {
-    let cut = |values: [i64; 3], pixels: Range<i32>| {
-        let first = (values[0].min(values[1]).min(values[2]) >> GRID_BITS).max(pixels.start.into());
-        let end = (-(-values[0].max(values[1]).max(values[2]) >> GRID_BITS)).min(pixels.end.into());
+pub(super) fn touched(corners: &[GridPoint], columns: i32, rows: Range<i32>) -> Option<(Range<i32>, Range<i32>)> {
+    let (low, high) = hull(corners);
+    let cut = |low: i64, high: i64, pixels: Range<i32>| {
+        let first = (low >> GRID_BITS).max(pixels.start.into());
+        let end = (-(-high >> GRID_BITS)).min(pixels.end.into());
         (first < end).then_some(first as i32..end as i32)
     };
-    cut(corners.map(|c| c.x), 0..columns).zip(cut(corners.map(|c| c.y), rows))
+    cut(low.x, high.x, 0..columns).zip(cut(low.y, high.y, rows))
 }
 
-/// Calls `span(row, columns)` for each of `rows` in which the triangle covers centres; columns are not cut to the
-/// surface. Corners must be positive ([`is_positive`]).
+/// The least and the greatest coordinates; `corners` are not empty.
 #[inline]
-pub(super) fn scan(corners: [GridPoint; 3], rows: Range<i32>, mut span: impl FnMut(i32, Range<i64>)) {
+pub(super) fn hull(corners: &[GridPoint]) -> (GridPoint, GridPoint) {
+    let (mut low, mut high) = (corners[0], corners[0]);
+    for corner in &corners[1..] {
+        low = GridPoint { x: low.x.min(corner.x), y: low.y.min(corner.y) };
+        high = GridPoint { x: high.x.max(corner.x), y: high.y.max(corner.y) };
+    }
+    (low, high)
+}
+
+/// Calls `span(row, columns)` for each of `rows` in which the polygon covers centres; columns are not cut to the
+/// surface. It must be convex and turn from +x to +y ([`turn`]).
+#[inline]
+pub(super) fn scan(corners: &[GridPoint], rows: Range<i32>, mut span: impl FnMut(i32, Range<i64>)) {
     if rows.is_empty() {
         return;
     }
-    let [mut top, mut middle, mut bottom] = corners;
-    let mut long_is_left = true;
-    for _ in 0..2 {
-        if middle.y < top.y {
-            (top, middle) = (middle, top);
-            long_is_left = !long_is_left;
-        }
-        if bottom.y < middle.y {
-            (middle, bottom) = (bottom, middle);
-            long_is_left = !long_is_left;
-        }
-    }
+    let top = (1..corners.len()).fold(0, |top, i| if corners[i].y < corners[top].y { i } else { top });
+    let bottom = hull(corners).1.y;
     let cut = |y: i64| first_center(y).clamp(i64::from(rows.start), i64::from(rows.end)) as i32;
-    let (first, turn, end) = (cut(top.y), cut(middle.y), cut(bottom.y));
-    if first == end {
-        return;
-    }
-    let mut long = Edge::new(top, bottom, first);
-    for (upper, lower, rows) in [(top, middle, first..turn), (middle, bottom, turn..end)] {
-        if rows.is_empty() {
-            continue;
+    let (mut row, end) = (cut(corners[top].y), cut(bottom));
+    let mut left = Side { at: top, step: corners.len() - 1, end: row, edge: Edge::default() };
+    let mut right = Side { step: 1, ..left };
+    while row < end {
+        left.reach(corners, row);
+        right.reach(corners, row);
+        let stop = left.end.min(right.end).min(end);
+        if stop <= row {
+            return;
         }
-        let mut short = Edge::new(upper, lower, rows.start);
-        for row in rows {
-            let (long, short) = (long.next(), short.next());
-            let columns = if long_is_left { long..short } else { short..long };
-            if !columns.is_empty() {
-                span(row, columns);
+        if left.edge.is_wide || right.edge.is_wide {
+            for row in row..stop {
+                let columns = left.edge.wide_column(row)..right.edge.wide_column(row);
+                if !columns.is_empty() {
+                    span(row, columns);
+                }
+            }
+        } else {
+            let mut at = [left.edge.at(row), right.edge.at(row)];
+            for row in row..stop {
+                let columns = at[0] >> EDGE_BITS..at[1] >> EDGE_BITS;
+                if !columns.is_empty() {
+                    span(row, columns);
+                }
+                at = [at[0].wrapping_add(left.edge.step), at[1].wrapping_add(right.edge.step)];
+            }
+        }
+        row = stop;
+    }
+}
+
+/// One side of a convex polygon on the way down.
+#[derive(Debug, Clone, Copy)]
+struct Side {
+    /// The corner that the present edge leads to.
+    at: usize,
+    /// What leads from a corner to the next one down, modulo the number of corners.
+    step: usize,
+    /// The first row beyond the present edge.
+    end: i32,
+    edge: Edge,
+}
+
+impl Side {
+    /// Goes on to the edge that crosses `row`, if the present one does not.
+    #[inline]
+    fn reach(&mut self, corners: &[GridPoint], row: i32) {
+        // No side has more edges than there are corners.
+        for _ in 0..corners.len() {
+            if self.end > row {
+                return;
+            }
+            let upper = corners[self.at];
+            self.at += self.step;
+            if self.at >= corners.len() {
+                self.at -= corners.len();
+            }
+            let lower = corners[self.at];
+            // Saturates: the surface's rows are far within 32 bits.
+            self.end = first_center(lower.y).clamp(i32::MIN.into(), i32::MAX.into()) as i32;
+            if self.end > row {
+                self.edge = Edge::new(upper, lower);
             }
         }
     }
 }
 
-/// The first column right of an edge, row after row.
-enum Edge {
-    /// Carries quotient and remainder from row to row: column = floor of an exact fraction with this denominator.
-    Narrow { column: i64, rest: i64, step: i64, step_rest: i64, den: i64 },
-    /// Divides in every row; for edges so long that the fraction does not fit 64 bits.
-    Wide { upper: GridPoint, dx: i128, dy: i128, row: i32 },
+/// Binary digits after the point of an edge's columns.
+const EDGE_BITS: u32 = 28;
+
+/// The first column whose centre is right of an edge or on it, row by row. A function of the edge's ends and the row
+/// alone: rounding may move the line by less than 2^-13 px, but for all that share it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Edge {
+    upper: GridPoint,
+    /// Pixels to the right a row.
+    slope: f64,
+    /// The first row whose centre the edge reaches.
+    first: i64,
+    /// There, with [`EDGE_BITS`] digits, such that cutting them off gives the column.
+    column: i64,
+    /// To the next row.
+    step: i64,
+    /// Too long for these digits.
+    is_wide: bool,
 }
 
 impl Edge {
-    /// An edge from its upper to its lower end (upper.y < lower.y), at a row between them.
+    /// An edge from its upper to its lower end (upper.y < lower.y).
     #[inline]
-    fn new(upper: GridPoint, lower: GridPoint, row: i32) -> Self {
+    fn new(upper: GridPoint, lower: GridPoint) -> Self {
+        const WIDEST: i64 = 1 << 50;
+        const SHIFT: u32 = EDGE_BITS - GRID_BITS;
         let (dx, dy) = (lower.x - upper.x, lower.y - upper.y);
-        if dx.abs() >= NARROW || dy >= NARROW {
-            return Self::Wide { upper, dx: dx.into(), dy: dy.into(), row };
-        }
-        let (base, fraction) = ((upper.x - HALF) >> GRID_BITS, (upper.x - HALF) & (ONE - 1));
-        let den = dy << GRID_BITS;
-        let below = (i64::from(row) << GRID_BITS) + HALF - upper.y;
-        let ceiling = fraction * dy + dx * below + (den - 1);
-        Self::Narrow {
-            column: base + ceiling.div_euclid(den),
-            rest: ceiling.rem_euclid(den),
-            step: dx.div_euclid(dy),
-            step_rest: dx.rem_euclid(dy) << GRID_BITS,
-            den,
+        let slope = dx as f64 / dy as f64;
+        let first = first_center(upper.y);
+        let below = ((first << GRID_BITS) + HALF - upper.y) as f64;
+        // An edge that is steep this way has one row at most, and casts saturate.
+        let moved = (slope * below * f64::from(1 << SHIFT)) as i64;
+        let start = (upper.x << SHIFT).wrapping_add((HALF << SHIFT) - 1);
+        Self {
+            upper,
+            slope,
+            first,
+            column: start.wrapping_add(moved),
+            step: (slope * f64::from(1 << EDGE_BITS)) as i64,
+            is_wide: dx.abs() >= WIDEST || upper.x.abs() >= WIDEST,
         }
     }
 
-    /// The column in the present row; moves on to the next row.
+    /// Where it crosses a row, with [`EDGE_BITS`] digits.
     #[inline]
-    fn next(&mut self) -> i64 {
-        match self {
-            Self::Narrow { column, rest, step, step_rest, den } => {
-                let here = *column;
-                *rest += *step_rest;
-                let carry = *rest >= *den;
-                *rest -= if carry { *den } else { 0 };
-                *column += *step + i64::from(carry);
-                here
-            }
-            Self::Wide { upper, dx, dy, row } => {
-                let below = i128::from((i64::from(*row) << GRID_BITS) + HALF - upper.y);
-                *row += 1;
-                let den = *dy << GRID_BITS;
-                let numerator = i128::from(upper.x - HALF) * *dy + *dx * below;
-                (numerator + (den - 1)).div_euclid(den) as i64
-            }
-        }
+    fn at(&self, row: i32) -> i64 {
+        self.column.wrapping_add(self.step.wrapping_mul(i64::from(row) - self.first))
+    }
+
+    /// The column in a row, of a wide edge.
+    fn wide_column(&self, row: i32) -> i64 {
+        let below = ((i64::from(row) << GRID_BITS) + HALF - self.upper.y) as f64;
+        let x = self.upper.x.saturating_add((self.slope * below) as i64);
+        first_center(x.clamp(-(1 << 60), 1 << 60))
     }
 }
 
@@ -189,7 +265,7 @@ mod tests {
         let corners = corners.map(|[x, y]| GridPoint { x: x * scale, y: y * scale });
         assert!(is_positive(corners));
         let mut pixels = Vec::new();
-        scan(corners, 0..size, |row, columns| {
+        scan(&corners, 0..size, |row, columns| {
             pixels.extend((columns.start.max(0)..columns.end.min(i64::from(size))).map(|x| (x as i32, row)));
         });
         pixels
@@ -214,15 +290,34 @@ mod tests {
     /// Long edges take the other arithmetic; a neighbour sees the same long edge, but the columns must also be right.
     #[test]
     fn wide_edges_agree_with_narrow_ones() {
-        let narrow = cover([[1, 2], [900, 301], [17, 700]], 800, ONE);
-        // The same triangle within a far larger one that has two of its edges on the same lines.
-        let wide = Edge::new(GridPoint { x: ONE, y: 2 * ONE }, GridPoint { x: 8990 * ONE + ONE, y: 2992 * ONE }, 2);
-        assert!(matches!(wide, Edge::Wide { .. }));
-        let mut wide = wide;
-        let mut near = Edge::new(GridPoint { x: ONE, y: 2 * ONE }, GridPoint { x: 900 * ONE, y: 301 * ONE }, 2);
-        for row in 2..301 {
-            assert_eq!(wide.next(), near.next(), "row {row}");
+        let wide = Edge::new(
+            GridPoint { x: -(1 << 51), y: -(1 << 51) + ONE / 3 },
+            GridPoint { x: (1 << 51) + ONE / 7, y: (1 << 51) - ONE },
+        );
+        assert!(wide.is_wide);
+        let line = |row: i64| {
+            let y = (row << GRID_BITS) + HALF;
+            let below = i128::from(y + (1 << 51) - ONE / 3);
+            (-(1i128 << 51)
+                + ((1i128 << 52) + i128::from(ONE / 7)) * below / ((1i128 << 52) - i128::from(ONE + ONE / 3)))
+                as i64
+        };
+        for row in [-5, 0, 1, 77, 1000] {
+            assert_eq!(wide.wide_column(row), first_center(line(row.into())), "row {row}");
         }
-        assert!(narrow.len() > 1000);
+    }
+
+    /// A row's column does not depend on the row at which an edge was entered.
+    #[test]
+    fn bands_of_rows_add_up() {
+        let corners = [[3, 1], [97, 40], [60, 89], [11, 77]].map(|[x, y]| GridPoint { x: x * ONE / 3, y: y * ONE / 3 });
+        let mut whole = Vec::new();
+        scan(&corners, 0..40, |row, columns| whole.push((row, columns)));
+        let mut parts = Vec::new();
+        for row in 0..40 {
+            scan(&corners, row..row + 1, |row, columns| parts.push((row, columns)));
+        }
+        assert_eq!(whole, parts);
+        assert!(whole.len() > 25);
     }
 }

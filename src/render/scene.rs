@@ -2,10 +2,11 @@
 
 use glam::{DVec2, IVec3, Vec3};
 
+use super::active::Active;
 use super::complex::{Complex, FINE_BITS};
-use super::draw::Placed;
+use super::draw::{Painters, Pieces};
 use super::interfaces::{Faces, Interfaces, child_faces};
-use super::parallel::fill_chunks;
+use super::parallel::{List, fill_chunks};
 use super::refiner::{FineNode, Refiner, Span, fine_color};
 use super::second::Second;
 use super::slice::{SLICES, above, blend, cross, edges_on};
@@ -25,15 +26,19 @@ pub struct Scene {
     complex: Complex,
     /// One a node, in fine levels.
     colors: Vec<IVec3>,
+    /// One a node: its position and colour side by side.
+    nodes: Vec<FineNode>,
     spans: Vec<Span>,
+    active: Active,
     /// As of the last anti-aliased picture.
     interfaces: Interfaces,
     /// Level 1; empty until it is first asked for.
     refiner: Refiner,
     /// Level 2, around the planes lately drawn.
     second: Second,
-    /// Triangles of the last picture; kept for their memory.
-    pub(super) triangles: Vec<Vec<Placed>>,
+    /// Polygons of the last picture; kept for their memory.
+    pub(super) pieces: Vec<Pieces>,
+    pub(super) painters: Painters,
 }
 
 /// A polygon's corner: its place in fine units, and its colour.
@@ -55,11 +60,14 @@ impl Scene {
             domain,
             complex: Complex::default(),
             colors: Vec::new(),
+            nodes: Vec::new(),
             spans: Vec::new(),
+            active: Active::new(domain.unit() << FINE_BITS),
             interfaces: Interfaces::new(),
             refiner: Refiner::default(),
             second: Second::default(),
-            triangles: Vec::new(),
+            pieces: Vec::new(),
+            painters: Painters::default(),
         }
     }
 
@@ -85,6 +93,8 @@ impl Scene {
         }
         self.colors.extend(mesh.wedges[nodes..].iter().map(|wedge| fine_color(wedge.color)));
         let complex = &self.complex;
+        let node = |node: usize| FineNode { position: complex.position(node as u32), color: self.colors[node] };
+        self.nodes.extend((nodes..complex.nodes.len()).map(node));
         let span = |corners: &[u32; 4]| Span::of(corners.map(|node| complex.position(node)));
         self.spans.extend(self.complex.tets[tets..].iter().map(span));
     }
@@ -98,18 +108,17 @@ impl Scene {
     /// Cuts the scene, subdivided `levels` times, at `t` (fine units). `make` appends to a list what the caller keeps
     /// of each polygon, given the control tet. Lists, one after the other, hold polygons in the order
     /// of control tets and of children; what was in them is gone.
-    pub(super) fn cut<P: Send>(
+    pub(super) fn cut<L: List>(
         &mut self,
         t: i32,
         levels: u8,
-        lists: &mut Vec<Vec<P>>,
-        make: impl Fn(&mut Vec<P>, u32, Polygon<'_>) + Sync + Send,
+        lists: &mut Vec<L>,
+        make: impl Fn(&mut L, u32, Polygon<'_>) + Sync + Send,
     ) {
         if levels == 0 {
-            let tets = (0..self.spans.len() as u32).filter(|&tet| self.spans[tet as usize].is_cut(t));
-            let tets: Vec<u32> = tets.collect();
-            return collect(lists, &tets, |polygons, tet| {
-                let nodes = self.complex.tets[tet as usize].map(|node| self.node(node));
+            let tets = self.active.cut(&self.spans, t);
+            return collect(lists, tets, |polygons, tet| {
+                let nodes = self.complex.tets[tet as usize].map(|node| self.nodes[node as usize]);
                 slice(nodes, t, self.interfaces.faces(tet), |polygon| make(polygons, tet, polygon));
             });
         }
@@ -135,10 +144,6 @@ impl Scene {
             let parent = Parent { level: second.level(), tet, faces };
             parent.slice_children(t, |polygon| make(polygons, control, polygon));
         });
-    }
-
-    fn node(&self, node: u32) -> FineNode {
-        FineNode { position: self.complex.position(node), color: self.colors[node as usize] }
     }
 
     /// Brings the second level up to the plane at `t`.
@@ -177,7 +182,7 @@ impl Scene {
 }
 
 /// Runs `work` on each of `tets`, on any number of threads.
-fn collect<P: Send>(lists: &mut Vec<Vec<P>>, tets: &[u32], work: impl Fn(&mut Vec<P>, u32) + Sync + Send) {
+fn collect<L: List>(lists: &mut Vec<L>, tets: &[u32], work: impl Fn(&mut L, u32) + Sync + Send) {
     fill_chunks(lists, tets.len(), CHUNK, |list, run| tets[run].iter().for_each(|&tet| work(list, tet)));
 }
 

@@ -27,7 +27,7 @@ pub fn cross_section(mesh: &TetMesh, frame: f64, levels: u8) -> Vec<SectionPolyg
     let mut scene = Scene::new(mesh.domain);
     scene.extend(mesh);
     let fine = f64::from(mesh.domain.unit()) * f64::from(1 << FINE_BITS);
-    let mut lists = Vec::new();
+    let mut lists: Vec<Vec<SectionPolygon>> = Vec::new();
     scene.cut(plane(&mesh.domain, frame), levels, &mut lists, |polygons, tet, polygon| {
         polygons.push(SectionPolygon {
             tet,

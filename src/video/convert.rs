@@ -1,5 +1,6 @@
 //! Colour conversion: Y'CbCr of BT.601 and BT.709, limited range, and pictures from planes of bytes.
 
+use glam::Vec3A;
 use thiserror::Error;
 
 use super::{Frame, FrameError, PixelFormat, YuvMatrix};
@@ -73,6 +74,17 @@ impl YuvMatrix {
         ]
     }
 
+    /// Y, Cb, Cr of a colour in RGB levels, not rounded.
+    #[inline]
+    pub(crate) fn of_levels(self, rgb: Vec3A) -> Vec3A {
+        let row = |[r, g, b]: [i64; 3], offset: i32| {
+            const ONE: f32 = (1 << BITS) as f32;
+            (r as f32 * rgb.x + g as f32 * rgb.y + b as f32 * rgb.z) / ONE + offset as f32
+        };
+        let [y, cb, cr] = self.forward();
+        Vec3A::new(row(y, OFFSETS[0]), row(cb, OFFSETS[1]), row(cr, OFFSETS[2]))
+    }
+
     /// What luma gives to all channels, then R from Cr, G from Cb, G from Cr, B from Cb.
     const fn inverse(self) -> [i64; 5] {
         let (kr, kb) = self.luma_weights();
@@ -87,16 +99,26 @@ const fn fixed(v: f64) -> i64 {
     if scaled < 0.0 { (scaled - 0.5) as i64 } else { (scaled + 0.5) as i64 }
 }
 
-/// Y, Cb, Cr of the mean of `count` colours given by their `sum`, each rounded once.
-pub(crate) fn rgb_to_yuv(matrix: YuvMatrix, sum: [i32; 3], count: i32) -> [u8; 3] {
-    const MATRICES: [[[i64; 3]; 3]; 2] = [YuvMatrix::Bt601.forward(), YuvMatrix::Bt709.forward()];
+/// Y, Cb, Cr of a colour in RGB levels within [0, 255].
+#[inline]
+pub(crate) fn rgb_to_yuv(matrix: YuvMatrix, rgb: [i32; 3]) -> [u8; 3] {
+    const MATRICES: [[[i32; 3]; 3]; 2] = [narrow(YuvMatrix::Bt601.forward()), narrow(YuvMatrix::Bt709.forward())];
     let rows = &MATRICES[usize::from(matrix == YuvMatrix::Bt709)];
-    let (count, half) = (i64::from(count), i64::from(count) << (BITS - 1));
-    let offsets = [16, 128, 128];
-    std::array::from_fn(|i| {
-        let v: i64 = rows[i].iter().zip(sum).map(|(weight, v)| weight * i64::from(v)).sum();
-        (offsets[i] + ((v + half).div_euclid(count) >> BITS)).clamp(0, 255) as u8
-    })
+    let row = |i: usize| rows[i][0] * rgb[0] + rows[i][1] * rgb[1] + rows[i][2] * rgb[2] + (1 << (BITS - 1));
+    std::array::from_fn(|i| ((row(i) >> BITS) + OFFSETS[i]) as u8)
+}
+
+/// What Y, Cb and Cr of black are.
+const OFFSETS: [i32; 3] = [16, 128, 128];
+
+const fn narrow(rows: [[i64; 3]; 3]) -> [[i32; 3]; 3] {
+    let mut narrow = [[0; 3]; 3];
+    let mut i = 0;
+    while i < 9 {
+        narrow[i / 3][i % 3] = rows[i / 3][i % 3] as i32;
+        i += 1;
+    }
+    narrow
 }
 
 /// R, G, B of a colour in Y'CbCr, chroma given in eighths of a level.
@@ -211,8 +233,10 @@ mod tests {
             (YuvMatrix::Bt709, [0, 255, 0], [173, 42, 26]),
             (YuvMatrix::Bt709, [255, 0, 0], [63, 102, 240]),
         ] {
-            assert_eq!(rgb_to_yuv(matrix, rgb, 1), yuv, "{matrix:?} {rgb:?}");
-            assert_eq!(rgb_to_yuv(matrix, rgb.map(|v| 8 * v), 8), yuv, "{matrix:?} {rgb:?}, mean of eight");
+            assert_eq!(rgb_to_yuv(matrix, rgb), yuv, "{matrix:?} {rgb:?}");
+            let exact = matrix.of_levels(Vec3A::from_array(rgb.map(|v| v as f32))).to_array();
+            let near = exact.iter().zip(yuv).all(|(exact, yuv)| (exact - f32::from(yuv)).abs() <= 0.51);
+            assert!(near, "{matrix:?} {rgb:?}: {exact:?}");
         }
     }
 
@@ -221,7 +245,7 @@ mod tests {
         for matrix in [YuvMatrix::Bt601, YuvMatrix::Bt709] {
             for i in 0..4096 {
                 let rgb = [i % 16 * 17, i / 16 % 16 * 17, i / 256 * 17];
-                let [y, cb, cr] = rgb_to_yuv(matrix, rgb, 1);
+                let [y, cb, cr] = rgb_to_yuv(matrix, rgb);
                 let back = yuv_to_rgb(matrix, y, 8 * i32::from(cb), 8 * i32::from(cr));
                 let off = (0..3).map(|c| (i32::from(back[c]) - rgb[c]).abs()).max();
                 assert!(off <= Some(2), "{matrix:?} {rgb:?} -> {back:?}");

@@ -17,12 +17,12 @@ pub(crate) fn picture(mesh: &TetMesh, frame: f64, params: DrawParams, size: (u32
 
 /// The whole picture with anti-aliased boundaries.
 pub(crate) fn smooth(levels: u8) -> DrawParams {
-    DrawParams { levels, antialias: true, viewport: None }
+    DrawParams { levels, antialias: true, viewport: None, mesh: false }
 }
 
 /// The whole picture with each pixel as at its centre.
 pub(crate) fn stairs(levels: u8) -> DrawParams {
-    DrawParams { levels, antialias: false, viewport: None }
+    DrawParams { levels, antialias: false, viewport: None, mesh: false }
 }
 
 /// The RGB picture that `work` draws.

@@ -8,6 +8,7 @@ use gst::subclass::prelude::*;
 
 use super::CAT;
 use super::imp::TetvecDec;
+use super::view::Shape;
 
 impl TetvecDec {
     /// An event from upstream.
@@ -38,7 +39,10 @@ impl TetvecDec {
                 self.negotiate_early();
                 self.push_or_hold(event)
             }
-            _ if event.is_serialized() => self.push_or_hold(event),
+            _ if event.is_serialized() => {
+                self.finish_picture();
+                self.push_or_hold(event)
+            }
             _ => self.forward(pad, event),
         }
     }
@@ -51,10 +55,29 @@ impl TetvecDec {
                 self.lock_output().qos.report(proportion, diff, timestamp);
                 self.forward(pad, event)
             }
+            gst::EventView::Navigation(_) => {
+                let event = self.to_source_places(event);
+                self.forward(pad, event)
+            }
             // The pad is marked already; what is sent to us does not depend on what we send.
             gst::EventView::Reconfigure(_) => true,
             _ => self.forward(pad, event),
         }
+    }
+
+    /// A navigation event with its place in pixels of the source.
+    fn to_source_places(&self, event: gst::Event) -> gst::Event {
+        let shape = self.lock_output().output.as_ref().map(|output| Shape::of(&output.info));
+        let (Some(shape), Some(source), Some(structure)) = (shape, self.lock_stream().source, event.structure()) else {
+            return event;
+        };
+        let place = |name| structure.get::<f64>(name).ok();
+        let (Some(x), Some(y)) = (place("pointer_x"), place("pointer_y")) else { return event };
+        let [x, y] = self.view().to_source([x, y], shape, source);
+        let mut structure = structure.to_owned();
+        structure.set("pointer_x", x);
+        structure.set("pointer_y", y);
+        gst::event::Navigation::builder(structure).seqnum(event.seqnum()).build()
     }
 
     fn forward(&self, pad: &gst::Pad, event: gst::Event) -> bool {
@@ -83,7 +106,12 @@ impl TetvecDec {
             }
         };
         self.lock_output().qos.reset();
-        self.lock_stream().set_segment(segment);
+        let mut query = gst::query::Latency::new();
+        let live = self.sink_pad.peer_query(&mut query) && query.result().0;
+        let mut stream = self.lock_stream();
+        stream.set_segment(segment);
+        stream.urgent.live = live;
+        drop(stream);
         self.push_or_hold(event)
     }
 
@@ -98,8 +126,16 @@ impl TetvecDec {
         self.src_pad.push_event(event)
     }
 
-    /// Shows what is gathered for reverse playback. Errors of the flow come back with the next buffer.
+    /// Shows the picture that waits for the next packet. Errors of the flow come back with the next buffer.
+    fn finish_picture(&self) {
+        if let Err(error) = self.show_pending() {
+            gst::debug!(CAT, imp = self, "The last picture ended with {error:?}");
+        }
+    }
+
+    /// Shows what is left to show. Errors of the flow come back with the next buffer.
     fn drain(&self) {
+        self.finish_picture();
         let group = self.lock_stream().take_gathered();
         if let Err(error) = self.play_group(group) {
             gst::debug!(CAT, imp = self, "Draining ended with {error:?}");

@@ -15,7 +15,7 @@ use super::negotiate;
 use super::output::Output;
 use super::qos::Qos;
 use super::stream::{Decoded, Stream};
-use super::timing::{Picture, Span};
+use super::view::View;
 use crate::{MAX_THREADS, caps};
 
 /// `subdivision-levels`: as the stream says.
@@ -26,11 +26,12 @@ struct Settings {
     subdivision_levels: i32,
     antialias: bool,
     threads: u32,
+    view: View,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { subdivision_levels: LEVELS_OF_STREAM, antialias: true, threads: 0 }
+        Self { subdivision_levels: LEVELS_OF_STREAM, antialias: true, threads: 0, view: View::default() }
     }
 }
 
@@ -48,7 +49,7 @@ impl Settings {
 #[derive(Debug, Default)]
 pub(super) struct Shared {
     flushing: bool,
-    output: Option<Output>,
+    pub(super) output: Option<Output>,
     pub(super) qos: Qos,
 }
 
@@ -70,6 +71,11 @@ impl TetvecDec {
         self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// What of the picture is to be shown now.
+    pub(super) fn view(&self) -> View {
+        self.lock_settings().view
+    }
+
     fn lock_settings(&self) -> MutexGuard<'_, Settings> {
         self.settings.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -87,7 +93,7 @@ impl TetvecDec {
         }
     }
 
-    fn check_flow(&self) -> Result<(), gst::FlowError> {
+    pub(super) fn check_flow(&self) -> Result<(), gst::FlowError> {
         if self.lock_output().flushing { Err(gst::FlowError::Flushing) } else { Ok(()) }
     }
 
@@ -108,7 +114,17 @@ impl TetvecDec {
     }
 
     fn play_packet(&self, packet: &gst::Buffer) -> Result<gst::FlowSuccess, gst::FlowError> {
-        let Some(number) = self.decode(packet) else { return Ok(gst::FlowSuccess::Ok) };
+        let pending = self.lock_stream().pending.take();
+        let decoded = match pending {
+            Some(pending) => self.show(pending, Some(packet))?,
+            None => None,
+        };
+        let decoded = decoded.unwrap_or_else(|| self.lock_stream().decode(packet));
+        let number = match self.judge(packet, decoded) {
+            Decoded::Picture(number) => Some(number),
+            Decoded::Concealed => None,
+            _ => return Ok(gst::FlowSuccess::Ok),
+        };
         let span = self.lock_stream().admit(packet, number);
         self.show_all(number, span)
     }
@@ -118,23 +134,28 @@ impl TetvecDec {
         let mut packets = Vec::with_capacity(group.len());
         for packet in group {
             self.check_flow()?;
-            if let Some(number) = self.decode(&packet) {
+            let decoded = self.lock_stream().decode(&packet);
+            if let Decoded::Picture(number) = self.judge(&packet, decoded) {
                 packets.push((packet, number));
             }
         }
         let spans = self.lock_stream().admit_group(&packets);
         for (&span, (_, number)) in spans.iter().zip(&packets).rev() {
-            self.show_all(*number, span)?;
+            self.show_all(Some(*number), span)?;
         }
+        self.show_pending()?;
         Ok(gst::FlowSuccess::Ok)
     }
 
-    /// Decodes a packet to the number of its frame. A damaged packet is told to the application, and a keyframe asked for.
-    fn decode(&self, packet: &gst::Buffer) -> Option<u64> {
-        let decoded = self.lock_stream().decode(packet);
-        match decoded {
-            Decoded::Picture(number) => return Some(number),
-            Decoded::Nothing => return None,
+    /// Tells the application of a damaged packet, asks for a keyframe, and finds out whether the loss can be concealed.
+    fn judge(&self, packet: &gst::Buffer, decoded: Decoded) -> Decoded {
+        match &decoded {
+            Decoded::Picture(_) => {
+                let mut stream = self.lock_stream();
+                stream.discont |= std::mem::take(&mut stream.after_loss);
+                return decoded;
+            }
+            Decoded::Nothing | Decoded::Concealed => return decoded,
             Decoded::Waiting => gst::debug!(CAT, imp = self, "Skipping up to the next keyframe: {packet:?}"),
             Decoded::Damaged(reason) => {
                 gst::element_imp_warning!(
@@ -145,70 +166,15 @@ impl TetvecDec {
                 );
             }
         }
-        let request = {
+        let (request, conceal) = {
             let mut stream = self.lock_stream();
-            stream.discont = true;
-            stream.wants_keyframe()
+            stream.discont |= !std::mem::replace(&mut stream.after_loss, true);
+            (stream.wants_keyframe(), stream.can_conceal())
         };
         if request {
             self.sink_pad.push_event(gst_video::UpstreamForceKeyUnitEvent::builder().all_headers(true).build());
         }
-        None
-    }
-
-    fn show_all(&self, frame_number: u64, span: Span) -> Result<gst::FlowSuccess, gst::FlowError> {
-        loop {
-            self.check_flow()?;
-            // Before each picture, so that none is drawn at a size that downstream no longer takes.
-            self.negotiate_if_needed()?;
-            let Some(picture) = self.lock_stream().next_picture(span) else { break };
-            self.show(frame_number as f64 + picture.position, picture)?;
-        }
-        Ok(gst::FlowSuccess::Ok)
-    }
-
-    /// Draws the picture at `frame`, counted in frames, and sends it, unless the segment or QoS forbid.
-    fn show(&self, frame: f64, picture: Picture) -> Result<(), gst::FlowError> {
-        let segment = self.lock_stream().segment.clone();
-        let Some((time, duration)) = clip(&segment, picture)? else { return Ok(()) };
-        if self.is_late(&segment, time, duration) {
-            self.lock_stream().discont = true;
-            return Ok(());
-        }
-        let output = self.lock_output().output.clone().ok_or(gst::FlowError::NotNegotiated)?;
-        let buffer = output.pool.acquire_buffer(None)?;
-        let drawn = output.draw(buffer, |surface| self.lock_stream().render(frame, surface));
-        let mut buffer = drawn.map_err(|error| {
-            error.log_with_object(&*self.obj());
-            gst::element_imp_error!(self, gst::StreamError::Decode, ("Cannot draw a picture"), ["{error:?}"]);
-            gst::FlowError::Error
-        })?;
-        let discont = std::mem::take(&mut self.lock_stream().discont);
-        let header = buffer.make_mut();
-        header.set_pts(time);
-        header.set_duration(duration);
-        if discont {
-            header.set_flags(gst::BufferFlags::DISCONT);
-        }
-        self.src_pad.push(buffer).map(|_| ())
-    }
-
-    /// Whether a picture comes too late to be worth drawing; the application is told of it.
-    fn is_late(
-        &self,
-        segment: &gst::FormattedSegment<gst::ClockTime>,
-        time: gst::ClockTime,
-        duration: Option<gst::ClockTime>,
-    ) -> bool {
-        let message = {
-            let mut shared = self.lock_output();
-            if !shared.qos.is_late(segment.to_running_time(time)) {
-                return false;
-            }
-            shared.qos.message(time, duration, segment)
-        };
-        let _ = self.obj().post_message(message.src(&*self.obj()).build());
-        true
+        if conceal { Decoded::Concealed } else { decoded }
     }
 
     /// Negotiates if downstream asked for it, or the stream changed.
@@ -262,26 +228,6 @@ impl TetvecDec {
     }
 }
 
-/// The part of `picture` that lies in `segment`; `None` outside.
-fn clip(
-    segment: &gst::FormattedSegment<gst::ClockTime>,
-    picture: Picture,
-) -> Result<Option<(gst::ClockTime, Option<gst::ClockTime>)>, gst::FlowError> {
-    let time = picture.time;
-    if segment.rate() > 0.0 && segment.stop().is_some_and(|stop| time >= stop) {
-        return Err(gst::FlowError::Eos);
-    }
-    let Some(duration) = picture.duration else {
-        let outside =
-            segment.start().is_some_and(|start| time < start) || segment.stop().is_some_and(|stop| time >= stop);
-        return Ok((!outside).then_some((time, None)));
-    };
-    let end = time.checked_add(duration);
-    let Some((start, stop)) = segment.clip(time, end) else { return Ok(None) };
-    let start = start.unwrap_or(time);
-    Ok(Some((start, stop.map(|stop| stop.saturating_sub(start)))))
-}
-
 #[glib::object_subclass]
 impl ObjectSubclass for TetvecDec {
     const NAME: &'static str = "GstTetvecDec";
@@ -319,7 +265,8 @@ impl ObjectImpl for TetvecDec {
     fn properties() -> &'static [glib::ParamSpec] {
         static PROPERTIES: LazyLock<Vec<glib::ParamSpec>> = LazyLock::new(|| {
             let default = Settings::default();
-            vec![
+            let mut properties = View::properties();
+            properties.extend([
                 glib::ParamSpecInt::builder("subdivision-levels")
                     .nick("Subdivision levels")
                     .blurb("Levels of subdivision to draw with: more is smoother and slower (-1 = as the stream says)")
@@ -341,7 +288,8 @@ impl ObjectImpl for TetvecDec {
                     .default_value(default.threads)
                     .mutable_ready()
                     .build(),
-            ]
+            ]);
+            properties
         });
         &PROPERTIES
     }
@@ -352,7 +300,7 @@ impl ObjectImpl for TetvecDec {
             "subdivision-levels" => settings.subdivision_levels = value.get().expect("checked by GObject"),
             "antialias" => settings.antialias = value.get().expect("checked by GObject"),
             "threads" => settings.threads = value.get().expect("checked by GObject"),
-            name => unreachable!("no property {name}"),
+            name => assert!(settings.view.set(name, value), "no property {name}"),
         }
     }
 
@@ -362,7 +310,7 @@ impl ObjectImpl for TetvecDec {
             "subdivision-levels" => settings.subdivision_levels.to_value(),
             "antialias" => settings.antialias.to_value(),
             "threads" => settings.threads.to_value(),
-            name => unreachable!("no property {name}"),
+            name => settings.view.get(name).unwrap_or_else(|| unreachable!("no property {name}")),
         }
     }
 

@@ -13,8 +13,10 @@ mod imp;
 mod negotiate;
 mod output;
 mod qos;
+mod show;
 mod stream;
 mod timing;
+mod view;
 
 static CAT: LazyLock<gst::DebugCategory> =
     LazyLock::new(|| gst::DebugCategory::new("tetvecdec", gst::DebugColorFlags::empty(), Some("Vector video decoder")));

@@ -3,7 +3,7 @@
 
 use gst::ClockTime;
 use gst::prelude::*;
-use tetvec::{DecodeError, Decoder, DecoderConfig, SequenceHeader, Surface};
+use tetvec::{DecodeError, Decoder, DecoderConfig, PacketInfo, RenderParams, SequenceHeader, Surface};
 
 use super::gop::Gop;
 use super::negotiate::Source;
@@ -14,12 +14,39 @@ use super::timing::{Direction, Picture, Schedule, Span};
 pub(super) enum Decoded {
     /// The picture of this frame number can be drawn.
     Picture(u64),
+    /// Lost; instead of its picture the last one before the loss can be shown.
+    Concealed,
     /// No picture belongs to this packet.
     Nothing,
     /// Skipped: no keyframe has come since the start, a flush or a damaged packet.
     Waiting,
     /// Not decodable; packets are skipped up to the next keyframe.
     Damaged(String),
+}
+
+/// Why a picture should not wait for the next packet.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Urgency {
+    /// Upstream is live: the next packet comes when its time has come.
+    pub(super) live: bool,
+    /// None has been shown since the start or a seek.
+    pub(super) first: bool,
+}
+
+impl Default for Urgency {
+    fn default() -> Self {
+        Self { live: false, first: true }
+    }
+}
+
+const UNREADABLE: &str = "the packet's memory cannot be read";
+
+/// A picture that is drawn when the next packet comes, so that both cores work: one draws, one decodes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pending {
+    /// Frame number, fractions between frames; `None` for one in place of a lost one.
+    pub(super) frame: Option<f64>,
+    pub(super) picture: Picture,
 }
 
 /// The state of one stream.
@@ -32,6 +59,12 @@ pub(super) struct Stream {
     pub(super) renegotiate: bool,
     /// The next picture follows a gap.
     pub(super) discont: bool,
+    /// Packets were lost since the last picture that was decoded.
+    pub(super) after_loss: bool,
+    /// Pictures leave at once: packets come when they are made, or none has left since the start or a seek.
+    pub(super) urgent: Urgency,
+    /// The picture that waits for the next packet.
+    pub(super) pending: Option<Pending>,
     /// A keyframe has been asked for since the last one came.
     keyframe_requested: bool,
     /// Packets that should have given a picture since the start or a flush.
@@ -53,6 +86,9 @@ impl Stream {
             source: None,
             renegotiate: true,
             discont: true,
+            after_loss: false,
+            urgent: Urgency::default(),
+            pending: None,
             keyframe_requested: false,
             packets: 0,
             decoded: 0,
@@ -68,6 +104,9 @@ impl Stream {
     pub(super) fn flush(&mut self) {
         self.segment = gst::FormattedSegment::new();
         self.discont = true;
+        self.after_loss = false;
+        self.urgent.first = true;
+        self.pending = None;
         self.keyframe_requested = false;
         (self.packets, self.decoded) = (0, 0);
         self.decoder.flush();
@@ -90,6 +129,7 @@ impl Stream {
         // A segment that goes on in the same direction continues its timeline (a loop without flush starts it anew).
         self.schedule.reset();
         self.segment = segment;
+        self.urgent.first = true;
     }
 
     /// Sets the rate of the output.
@@ -120,10 +160,31 @@ impl Stream {
 
     /// Decodes a packet.
     pub(super) fn decode(&mut self, packet: &gst::BufferRef) -> Decoded {
+        match packet.map_readable() {
+            Ok(map) => {
+                let result = self.decoder.send_packet(&map);
+                self.take(result)
+            }
+            Err(_) => Decoded::Damaged(UNREADABLE.into()),
+        }
+    }
+
+    /// Draws a picture and decodes the packet after it at the same time.
+    pub(super) fn render_and_decode(
+        &mut self,
+        params: &RenderParams,
+        surface: &mut Surface<'_>,
+        packet: &gst::BufferRef,
+    ) -> (Result<(), DecodeError>, Decoded) {
         let Ok(map) = packet.map_readable() else {
-            return Decoded::Damaged("the packet's memory cannot be read".into());
+            return (self.render(params, surface), Decoded::Damaged(UNREADABLE.into()));
         };
-        let result = self.decoder.send_packet(&map);
+        let (drawn, result) = self.decoder.render_and_send(params, surface, &map);
+        (drawn, self.take(result))
+    }
+
+    /// What the decoder made of a packet.
+    fn take(&mut self, result: Result<PacketInfo, DecodeError>) -> Decoded {
         if !matches!(&result, Ok(info) if !info.picture) {
             self.packets += 1;
         }
@@ -141,6 +202,12 @@ impl Stream {
             Err(_) if waiting => Decoded::Waiting,
             Err(error) => Decoded::Damaged(error.to_string()),
         }
+    }
+
+    /// Whether there is a picture to show in place of a lost one: the stream goes forward, picture by picture, and one
+    /// of this timeline was decoded.
+    pub(super) fn can_conceal(&self) -> bool {
+        self.decoded > 0 && self.direction() == Direction::Forward && !self.key_units_only()
     }
 
     /// Caps are believed before headers, as a container may know better; a header that changes in the middle, as where
@@ -168,8 +235,9 @@ impl Stream {
         !std::mem::replace(&mut self.keyframe_requested, true)
     }
 
-    /// Start and duration of a packet. Where it carries no stamps they follow from its frame number and the rate.
-    fn packet_time(&self, packet: &gst::BufferRef, frame_number: u64) -> (ClockTime, Option<ClockTime>) {
+    /// Start and duration of a packet. Where it carries no stamps they follow from its frame number and the rate, or
+    /// from the packet before where the number was lost.
+    fn packet_time(&self, packet: &gst::BufferRef, frame_number: Option<u64>) -> (ClockTime, Option<ClockTime>) {
         let rate = self.source.map(|source| source.framerate).filter(|rate| rate.numer() > 0);
         let time_of = |frames: u64| {
             let rate = rate?;
@@ -179,7 +247,7 @@ impl Stream {
         };
         let start = packet
             .pts()
-            .or_else(|| time_of(frame_number))
+            .or_else(|| time_of(frame_number?))
             .or_else(|| self.schedule.end())
             .or(self.segment.start())
             .unwrap_or(ClockTime::ZERO);
@@ -187,14 +255,14 @@ impl Stream {
     }
 
     /// The time that a decoded packet covers.
-    pub(super) fn admit(&mut self, packet: &gst::BufferRef, frame_number: u64) -> Span {
+    pub(super) fn admit(&mut self, packet: &gst::BufferRef, frame_number: Option<u64>) -> Span {
         let (start, duration) = self.packet_time(packet, frame_number);
         self.schedule.admit(start, duration, packet.flags().contains(gst::BufferFlags::DISCONT))
     }
 
     /// The times that the decoded packets of a group cover, which is shown backwards.
     pub(super) fn admit_group(&mut self, packets: &[(gst::Buffer, u64)]) -> Vec<Span> {
-        let times: Vec<_> = packets.iter().map(|(packet, number)| self.packet_time(packet, *number)).collect();
+        let times: Vec<_> = packets.iter().map(|(packet, number)| self.packet_time(packet, Some(*number))).collect();
         self.schedule.admit_group(&times)
     }
 
@@ -204,9 +272,9 @@ impl Stream {
         self.schedule.next(span, direction, single)
     }
 
-    /// Draws the picture at `frame`, counted in frames.
-    pub(super) fn render(&mut self, frame: f64, surface: &mut Surface<'_>) -> Result<(), DecodeError> {
-        self.decoder.render(frame, None, surface)
+    /// Draws a picture.
+    pub(super) fn render(&mut self, params: &RenderParams, surface: &mut Surface<'_>) -> Result<(), DecodeError> {
+        self.decoder.render_with(params, surface)
     }
 
     /// Keeps an event back until caps are sent.
