@@ -4,7 +4,6 @@
 //! changing the mesh.
 
 use super::framing::{PacketHeader, write_packet};
-use super::front::MAX_TIME_SHIFT;
 use super::slab::{Slab, SlabParams};
 use super::source::{Source, Writing};
 use super::{Limits, Packet, SequenceHeader, WriteError};
@@ -48,12 +47,10 @@ impl SlabWriter {
         self.check_domain(mesh)?;
         self.source.update(mesh)?;
         let mut body = Vec::new();
-        let time_shift = if self.slab.is_none() { Some(time_shift(mesh)) } else { None };
-        if let Some(time_shift) = time_shift {
+        if self.slab.is_none() {
             let header = self.header.to_bytes();
             body.extend_from_slice(&(header.len() as u16).to_le_bytes());
             body.extend_from_slice(&header);
-            body.push(time_shift as u8);
         }
         let header = self.header;
         let slab = self.slab.get_or_insert_with(|| {
@@ -61,7 +58,6 @@ impl SlabWriter {
                 domain: mesh.domain,
                 max_duration: header.max_duration(&Limits::default()),
                 color_step: header.color_step,
-                time_shift: time_shift.unwrap_or(0),
                 limits: Limits::default(),
             })
         });
@@ -109,27 +105,4 @@ impl SlabWriter {
         let expected = Domain { width, height, subpixel_bits, ..mesh.domain };
         if mesh.domain == expected { Ok(()) } else { Err(WriteError::Domain { expected, found: mesh.domain }) }
     }
-}
-
-/// The power of two by which time should be stretched for edges of the mesh to be as long in t as in x and y.
-fn time_shift(mesh: &TetMesh) -> i8 {
-    let (mut space, mut time) = (0u64, 0u64);
-    for tet in 0..mesh.tets.len() {
-        let [a, rest @ ..] = mesh.tet_positions(tet);
-        for b in rest {
-            let d = (b - a).abs();
-            space += u64::from(d.x.unsigned_abs()) + u64::from(d.y.unsigned_abs());
-            time += u64::from(d.z.unsigned_abs());
-        }
-    }
-    // Space has two axes; the nearest power of two, so compare at sqrt(1/2), about 181/256.
-    let (space, time) = ((space / 2).max(1), time.max(1));
-    let mut shift = 0i8;
-    while shift < MAX_TIME_SHIFT as i8 && time << shift < space * 181 / 256 {
-        shift += 1;
-    }
-    while shift > -(MAX_TIME_SHIFT as i8) && time * 181 / 256 > space << -shift.min(0) {
-        shift -= 1;
-    }
-    shift
 }
