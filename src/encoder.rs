@@ -5,6 +5,7 @@
 
 mod config;
 mod observer;
+mod quantize;
 mod rate;
 mod readiness;
 mod runs;

@@ -32,7 +32,6 @@ fn header_of(domain: Domain) -> SequenceHeader {
         pixel_aspect_ratio: Fraction { numerator: 1, denominator: 1 },
         subpixel_bits: domain.subpixel_bits,
         subdivision_levels: 1,
-        color_step: 16,
     }
 }
 
@@ -44,6 +43,7 @@ fn small_params(seed: u64) -> MeshParams {
 /// Packets of a slab of `frames` frames.
 fn write_slab(mesh: &TetMesh, first_frame: u64, frames: u32) -> Vec<Packet> {
     let mut writer = SlabWriter::try_new(header_of(mesh.domain), first_frame).expect("a header in range");
+    writer.set_color_step(16).expect("a step in range");
     let packets = (0..frames).map(|k| writer.write_packet(mesh, k + 1 == frames).expect("a tiling")).collect();
     assert!(writer.is_drained());
     packets
@@ -301,7 +301,7 @@ fn every_flipped_bit_is_noticed_and_does_no_harm() {
 fn random_payloads_do_no_harm() {
     let keyframe = &tiny_slab()[0].data;
     let whole = body(keyframe);
-    let payload_at = 2 + usize::from(whole[0]);
+    let payload_at = 2 + usize::from(whole[0]) + 1;
     let mut random = Random::new(11);
     for round in 0..3_000 {
         let mut body = whole[..payload_at].to_vec();
@@ -547,7 +547,9 @@ fn a_writer_refuses_what_no_parser_would_take() {
     assert!(matches!(write(&short), Err(WriteError::Mesh(_))));
 
     let mut writer = SlabWriter::try_new(header, 0).expect("a header in range");
+    assert_eq!(writer.set_color_step(0), Err(WriteError::ColorStep { found: 0 }));
     writer.write_packet(&mesh, false).expect("a tiling");
+    assert_eq!(writer.set_color_step(16), Err(WriteError::ColorStep { found: 16 }));
     let mut shrunk = mesh.clone();
     shrunk.tets.pop();
     assert!(matches!(writer.write_packet(&shrunk, false), Err(WriteError::NotAppended { .. })));

@@ -41,9 +41,9 @@ fn write_stream(slabs: &[TetMesh], color_step: u8) -> Vec<u8> {
             pixel_aspect_ratio: Fraction { numerator: 1, denominator: 1 },
             subpixel_bits,
             subdivision_levels: 0,
-            color_step,
         };
         let mut writer = SlabWriter::try_new(header, first_frame).expect("a header in range");
+        writer.set_color_step(color_step).expect("a step in range");
         for k in 1..=duration {
             let packet = writer.write_packet(mesh, k == duration).expect("a tiling");
             index.push(&packet);
@@ -113,7 +113,7 @@ fn describe(stream: &[u8]) -> String {
             before = [0; 3];
         }
         let mesh = parser.mesh().expect("a keyframe was parsed");
-        let color_step = parser.header().expect("a keyframe was parsed").color_step;
+        let color_step = parser.color_step().expect("a keyframe was parsed");
         let crc = checksum(mesh, before, color_step);
         before = [mesh.positions.len(), mesh.wedges.len(), mesh.tets.len()];
         let duration = if parser.is_duration_known() { mesh.domain.duration } else { 0 };

@@ -27,7 +27,6 @@ fn slab(first_frame: u64, seed: u64) -> (Vec<Packet>, TetMesh) {
         pixel_aspect_ratio: Fraction { numerator: 1, denominator: 1 },
         subpixel_bits: domain.subpixel_bits,
         subdivision_levels: 1,
-        color_step: 16,
     };
     let mut writer = SlabWriter::try_new(header, first_frame).expect("a header in range");
     let packets = (0..FRAMES).map(|k| writer.write_packet(&mesh, k + 1 == FRAMES).expect("a tiling")).collect();

@@ -18,6 +18,13 @@ const LEVELS: [i32; 2] = [-128, 383];
 /// Steps are counted in 1/16 of a level.
 const STEPS_A_LEVEL: i32 = 16;
 
+/// Quantisation steps of colours that a slab may have, in 1/16 of an 8-bit level.
+pub const COLOR_STEPS: std::ops::RangeInclusive<u8> = 1..=128;
+
+/// The quantisation step of a slab that has chosen none: 2 levels.
+#[cfg(feature = "encode")]
+pub(super) const DEFAULT_COLOR_STEP: u8 = 32;
+
 /// Range of a channel in steps of `step` sixteenths.
 fn step_range(step: u8) -> [i32; 2] {
     LEVELS.map(|level| level * STEPS_A_LEVEL / i32::from(step.max(1)))
@@ -36,7 +43,7 @@ pub(super) fn from_steps(steps: Steps, step: u8) -> Vec3 {
     Vec3::from_array(steps.map(|s| (s * i32::from(step)) as f32 / STEPS_A_LEVEL as f32))
 }
 
-/// What a colour (8-bit levels) will be after the stream, with a sequence's `color_step`.
+/// What a colour (8-bit levels) will be after the stream, with a slab's `color_step`.
 #[cfg(feature = "encode")]
 pub fn quantize_color(color: Vec3, color_step: u8) -> Vec3 {
     from_steps(to_steps(color, color_step), color_step)

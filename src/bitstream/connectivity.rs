@@ -126,6 +126,7 @@ fn angle_class(cos: f64) -> usize {
 }
 
 /// Whether the tet of `corners` and `apex` is positive.
+#[inline]
 fn is_positive(mesh: &TetMesh, [a, b, c]: [VertexId; 3], apex: VertexId) -> bool {
     let at = |v: VertexId| mesh.positions[v.index()];
     volume6(at(a), at(b), at(c), at(apex)) > 0
@@ -138,7 +139,8 @@ fn gap_cos(n: DVec3, m: DVec3) -> f64 {
 }
 
 /// The youngest open faces of a vertex, as columns: they are compared all with all.
-struct Fan {
+#[derive(Debug, Clone)]
+pub(super) struct Fan {
     count: usize,
     faces: [u32; SCAN],
     /// The corner after the focus, anticlockwise.
@@ -149,22 +151,24 @@ struct Fan {
 }
 
 impl Fan {
-    fn gather(front: &Front, focus: VertexId) -> Self {
-        let mut fan = Self {
-            count: 0,
-            faces: [0; SCAN],
-            second: [focus; SCAN],
-            third: [focus; SCAN],
-            normals: [DVec3::ZERO; SCAN],
-        };
-        for (place, (face, [_, second, third])) in front.at(focus).take(SCAN).enumerate() {
-            fan.faces[place] = face;
-            fan.second[place] = second;
-            fan.third[place] = third;
-            fan.normals[place] = front.face(face).normal;
-            fan.count = place + 1;
+    pub(super) const NEW: Self = Self {
+        count: 0,
+        faces: [0; SCAN],
+        second: [VertexId(0); SCAN],
+        third: [VertexId(0); SCAN],
+        normals: [DVec3::ZERO; SCAN],
+    };
+
+    fn gather(&mut self, front: &Front, focus: VertexId) {
+        self.count = 0;
+        for (face, [_, second, third]) in front.at(focus).take(SCAN) {
+            let place = self.count;
+            self.faces[place] = face;
+            self.second[place] = second;
+            self.third[place] = third;
+            self.normals[place] = front.face(face).normal;
+            self.count += 1;
         }
-        fan
     }
 
     /// The youngest face that follows face `place` around the focus.
@@ -195,9 +199,14 @@ impl Fan {
 }
 
 /// The open face at `focus` to close next: the one before the sharpest gap at an edge of `focus`, going around it
-/// anticlockwise. `None`: all faces at `focus` are closed.
-pub(super) fn choose_gate(front: &Front, mesh: &TetMesh, extents: &Extents, focus: VertexId) -> Option<Gate> {
-    let fan = Fan::gather(front, focus);
+/// anticlockwise. `None`: all faces at `focus` are closed. `fan` is room to work in.
+pub(super) fn choose_gate(
+    fan: &mut Fan,
+    (front, mesh): (&Front, &TetMesh),
+    extents: &Extents,
+    focus: VertexId,
+) -> Option<Gate> {
+    fan.gather(front, focus);
     if fan.count == 0 {
         return None;
     }

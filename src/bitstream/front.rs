@@ -126,7 +126,7 @@ impl Front {
 
     /// Takes an open face out.
     pub(super) fn remove(&mut self, face: u32) {
-        let OpenFace { corners, next, prev, .. } = self.faces[face as usize].clone();
+        let OpenFace { corners, next, prev, .. } = self.faces[face as usize];
         for (corner, vertex) in corners.into_iter().enumerate() {
             let (after, before) = (next[corner], prev[corner]);
             if before == NONE {

@@ -27,6 +27,7 @@ mod symbols;
 mod writer;
 
 pub use bits::{BitCounts, Part};
+pub use colors::COLOR_STEPS;
 #[cfg(feature = "encode")]
 pub use colors::quantize_color;
 #[cfg(feature = "encode")]

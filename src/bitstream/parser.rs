@@ -6,9 +6,10 @@
 use glam::IVec3;
 
 use super::bits::Tally;
-use super::colors::Steps;
+use super::colors::{COLOR_STEPS, Steps};
 use super::connectivity::Apex;
 use super::framing::{PacketHeader, parse_packet, read_u16, read_u32};
+use super::header::check_field;
 use super::range_coder::{BitCoder, BitModel, RangeDecoder};
 use super::slab::{Side, Slab, SlabParams};
 use super::{BitCounts, Limits, MeshFault, ParseError, Part, SequenceHeader};
@@ -137,6 +138,14 @@ impl SlabParser {
         }
     }
 
+    /// Quantisation step of the current slab's colours, in 1/16 of an 8-bit level; unknown after damage.
+    pub fn color_step(&self) -> Option<u8> {
+        match &self.state {
+            State::Open(open) => Some(open.slab.color_step()),
+            State::Empty | State::Broken(_) => None,
+        }
+    }
+
     /// Number of the current slab's first frame, counted from the start of the stream.
     pub fn first_frame(&self) -> Option<u64> {
         match &self.state {
@@ -184,8 +193,10 @@ impl OpenSlab {
             return Err(length(2));
         }
         let header_end = 2 + usize::from(read_u16(body, 0));
-        let Some((bytes, rest)) = body.split_at_checked(header_end) else { return Err(length(header_end)) };
-        let header = SequenceHeader::from_bytes(&bytes[2..], &limits)?;
+        let Some(&color_step) = body.get(header_end) else { return Err(length(header_end + 1)) };
+        let header = SequenceHeader::from_bytes(&body[2..header_end], &limits)?;
+        let steps = u64::from(*COLOR_STEPS.start())..=u64::from(*COLOR_STEPS.end());
+        check_field("color step", color_step.into(), steps)?;
         let slab = Slab::new(SlabParams {
             domain: Domain {
                 width: header.width,
@@ -194,11 +205,11 @@ impl OpenSlab {
                 subpixel_bits: header.subpixel_bits,
             },
             max_duration: header.max_duration(&limits),
-            color_step: header.color_step,
+            color_step,
             limits,
         });
         let open = Self { header, first_frame: packet.frame_number, packets: 0, ended: false, slab };
-        Ok((open, rest))
+        Ok((open, &body[header_end + 1..]))
     }
 
     /// Parses the part of the body that every packet of a slab has.

@@ -17,10 +17,8 @@ use crate::mesh::Domain;
 const SCALES: usize = 40;
 /// How near the prediction is to a side: beyond it, within an extent, farther.
 const NEARNESS: usize = 3;
-/// Classes of a component of the gate's unit normal.
-const SLOPES: usize = 5;
 /// Classes of how far behind the gate's plane the vertex is expected, in quarters of an extent.
-const HEIGHTS: usize = 8;
+const HEIGHTS: usize = 5;
 
 /// How far ahead of the gate's centre a vertex is expected, in extents along the normal.
 const AHEAD: f64 = 0.625;
@@ -38,8 +36,8 @@ const OPPOSITE: i32 = -1;
 struct AxisModels {
     /// Whether the vertex lies on the low and on the high side, by number of gate corners there and nearness.
     on_side: [[[BitModel; NEARNESS]; 4]; 2],
-    /// Residual of one of the first two coordinates, by scale and slope.
-    free: [[IntModel; SLOPES]; SCALES],
+    /// Residual of one of the first two coordinates, by scale.
+    free: [IntModel; SCALES],
     /// Distance beyond the gate's plane, by scale and expectation.
     height: [[UintModel; HEIGHTS]; SCALES],
 }
@@ -47,7 +45,7 @@ struct AxisModels {
 impl AxisModels {
     const NEW: Self = Self {
         on_side: [[[BitModel::NEW; NEARNESS]; 4]; 2],
-        free: [const { [const { IntModel::NEW }; SLOPES] }; SCALES],
+        free: [const { IntModel::NEW }; SCALES],
         height: [const { [const { UintModel::NEW }; HEIGHTS] }; SCALES],
     };
 }
@@ -199,8 +197,7 @@ pub(super) fn code_position(
             let nearest = expectation.nearest(position);
             code_height(coder, models, &expectation, nearest, truth[axis])
         } else {
-            let slope = ((expectation.normal[axis] + 1.0) * (SLOPES as f64 / 2.0)) as usize;
-            let model = &mut models.free[scale_class(expectation.extent[axis])][slope.min(SLOPES - 1)];
+            let model = &mut models.free[scale_class(expectation.extent[axis])];
             let predicted = expectation.predicted[axis];
             i64::from(predicted) + i64::from(model.code(coder, truth[axis].wrapping_sub(predicted)))
         };

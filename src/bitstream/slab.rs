@@ -12,7 +12,7 @@ use glam::IVec3;
 
 use super::bits::Part;
 use super::colors::{ColorModels, Misses, Steps};
-use super::connectivity::{Apex, ConnectivityModels, Gate, choose_gate, code_apex, code_vertex_id};
+use super::connectivity::{Apex, ConnectivityModels, Fan, Gate, choose_gate, code_apex, code_vertex_id};
 use super::extents::{Extents, PARTS};
 use super::front::{Front, unit_normal};
 use super::hops::{Hops, RINGS};
@@ -81,6 +81,7 @@ pub(super) struct Slab {
     max_duration: u32,
     limits: Limits,
     front: Front,
+    fan: Fan,
     hops: Hops,
     models: Box<Models>,
     /// Last wedge of each label.
@@ -141,6 +142,7 @@ impl Slab {
             max_duration: params.max_duration,
             limits: params.limits,
             front: Front::new(),
+            fan: Fan::NEW,
             hops: Hops::new(),
             models: Box::new(Models {
                 connectivity: ConnectivityModels::NEW,
@@ -159,6 +161,11 @@ impl Slab {
             passed_on: Vec::new(),
             complete: Complete { duration: 1, ..Complete::default() },
         }
+    }
+
+    /// Quantisation step of colours, in 1/16 of a level.
+    pub(super) fn color_step(&self) -> u8 {
+        self.color_step
     }
 
     /// What is coded so far.
@@ -200,7 +207,7 @@ impl Slab {
         self.hops.begin_packet(low_frames);
         loop {
             while let Some((vertex, hop)) = self.hops.next() {
-                while let Some(gate) = choose_gate(&self.front, &self.mesh, &self.extents, vertex) {
+                while let Some(gate) = self.choose_gate(vertex) {
                     self.close_gate(side, &gate)?;
                 }
                 self.pass_hop_on(vertex, hop);
@@ -241,6 +248,10 @@ impl Slab {
         self.bounds.top_known = true;
         self.mesh.domain.duration = duration;
         Ok(())
+    }
+
+    fn choose_gate(&mut self, focus: VertexId) -> Option<Gate> {
+        choose_gate(&mut self.fan, (&self.front, &self.mesh), &self.extents, focus)
     }
 
     /// The neighbours of `vertex`, whose star is complete, are one edge farther. Tets that were there the last time
@@ -401,9 +412,12 @@ impl Slab {
         }
         let positions = corners.map(|v| self.mesh.positions[v.index()]);
         self.check_positive(volume6(positions[0], positions[1], positions[2], positions[3]))?;
-        let facing = FACES.map(|face| {
-            // The gate is face 3, opposite the apex.
-            if face == FACES[3] && gate.is_some() { gate } else { self.front.facing(face.map(|c| corners[c])) }
+        let is_new = gate.is_some() && self.star_head[corners[3].index()] == NONE;
+        let facing = [0, 1, 2, 3].map(|face| match gate {
+            // The gate is face 3, opposite the apex; a new apex has no other open face.
+            Some(_) if face == 3 => gate,
+            Some(_) if is_new => None,
+            _ => self.front.facing(FACES[face].map(|c| corners[c])),
         });
         side.enter(Part::Labels);
         let label = self.code_tet_label(side, corners, gate, facing)?;

@@ -3,6 +3,7 @@
 //! In: the slab's committed mesh, once a packet. Out: packets, one a frame. Forbidden here: choosing keyframes, or
 //! changing the mesh.
 
+use super::colors::{COLOR_STEPS, DEFAULT_COLOR_STEP};
 use super::framing::{PacketHeader, write_packet};
 use super::slab::{Slab, SlabParams};
 use super::source::{Source, Writing};
@@ -14,6 +15,7 @@ use crate::mesh::{Domain, TetMesh};
 pub struct SlabWriter {
     header: SequenceHeader,
     first_frame: u64,
+    color_step: u8,
     packets: u32,
     ended: bool,
     source: Source,
@@ -28,7 +30,27 @@ impl SlabWriter {
     /// A header that no parser would accept.
     pub fn try_new(header: SequenceHeader, first_frame: u64) -> Result<Self, WriteError> {
         header.check(&Limits::default()).map_err(WriteError::Header)?;
-        Ok(Self { header, first_frame, packets: 0, ended: false, source: Source::new(), slab: None })
+        Ok(Self {
+            header,
+            first_frame,
+            color_step: DEFAULT_COLOR_STEP,
+            packets: 0,
+            ended: false,
+            source: Source::new(),
+            slab: None,
+        })
+    }
+
+    /// Quantises the slab's colours in steps of so many sixteenths of a level; without, in steps of two levels.
+    ///
+    /// # Errors
+    /// A step out of [`COLOR_STEPS`], or one that comes after the first packet.
+    pub fn set_color_step(&mut self, color_step: u8) -> Result<(), WriteError> {
+        if self.slab.is_some() || !COLOR_STEPS.contains(&color_step) {
+            return Err(WriteError::ColorStep { found: color_step });
+        }
+        self.color_step = color_step;
+        Ok(())
     }
 
     /// Writes the packet of the slab's next frame k (0, 1, ...), after which [k, k + 1) can be rendered.
@@ -51,13 +73,14 @@ impl SlabWriter {
             let header = self.header.to_bytes();
             body.extend_from_slice(&(header.len() as u16).to_le_bytes());
             body.extend_from_slice(&header);
+            body.push(self.color_step);
         }
         let header = self.header;
         let slab = self.slab.get_or_insert_with(|| {
             Slab::new(SlabParams {
                 domain: mesh.domain,
                 max_duration: header.max_duration(&Limits::default()),
-                color_step: header.color_step,
+                color_step: self.color_step,
                 limits: Limits::default(),
             })
         });
@@ -69,7 +92,7 @@ impl SlabWriter {
         } else {
             (self.packets + 1, (self.packets as i32 + 1).saturating_mul(mesh.domain.unit()))
         };
-        let mut side = Writing::new(&mut self.source, mesh, self.header.color_step, low_until);
+        let mut side = Writing::new(&mut self.source, mesh, self.color_step, low_until);
         slab.code_packet(&mut side, low_frames)?;
         body.extend_from_slice(&side.finish());
         self.source.sweep();

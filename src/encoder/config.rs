@@ -247,7 +247,6 @@ impl EncoderConfig {
             pixel_aspect_ratio: self.pixel_aspect_ratio,
             subpixel_bits: SUBPIXEL_BITS,
             subdivision_levels: self.subdivision_levels,
-            color_step: COLOR_STEP,
         }
     }
 }
@@ -258,8 +257,6 @@ const TETS_A_VERTEX: f64 = 7.0;
 const STEERED_RATIO: f64 = 0.02;
 /// Positions are rounded to 1/8 px and 1/8 frame: costs 0.1 dB (docs/benchmarks.md).
 const SUBPIXEL_BITS: u8 = 3;
-/// Colours are rounded to 2 levels, in sixteenths of a level.
-const COLOR_STEP: u8 = 32;
 
 fn setting<T: std::fmt::Debug>(
     field: &'static str,

@@ -4,10 +4,11 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::observer::{Event, Observer, Stage};
+use super::quantize::{color_step, rounded_rms};
 use super::readiness::{FAR, hops};
 use super::runs::{Run, Runs};
 use super::{EncodeError, EncoderConfig};
-use crate::bitstream::{Packet, RINGS, SlabWriter};
+use crate::bitstream::{Packet, RINGS, SlabWriter, quantize_color};
 use crate::mesh::{Domain, StarTable, TetMesh};
 use crate::vectorize::fit::{FitParams, FitReport, FitRequest, fit};
 use crate::vectorize::lattice::AdaptiveLattice;
@@ -104,6 +105,8 @@ pub(super) struct SlabEncoder<Q> {
     work: WorkMesh<Q>,
     committed: TetMesh,
     writer: SlabWriter,
+    /// Step of colours in sixteenths of a level, once it is chosen.
+    color_step: Option<u8>,
     runs: Runs,
     /// Frames that the fit may still need, and their labels.
     volume: Volume,
@@ -138,13 +141,15 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             },
             fit_params: FitParams {
                 subdivision_levels: config.subdivision_levels,
-                color_step: header.color_step,
+                // As good as none: how coarse colours may be follows from the error that they leave.
+                color_step: 1,
                 position_iterations: config.position_steps,
                 ..FitParams::default()
             },
             work: WorkMesh::new(domain),
             committed: TetMesh::empty(domain),
             writer: SlabWriter::try_new(header, first_frame)?,
+            color_step: None,
             runs: Runs::new(domain, config),
             volume: Volume::new(0),
             labels: VecDeque::new(),
@@ -338,11 +343,29 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             // A vertex may have moved past the limit; it is fitted again in the next part, which does no harm.
             low = high;
         }
+        self.quantize_colors(&mut total)?;
         let reached = ABSOLUTE_OVER_RMS * total.rms_after;
         if self.is_steered() && reached > 0.0 {
             self.error_gain *= (self.target_error / reached).powi(2).clamp(0.5, 2.0);
         }
         Ok(total)
+    }
+
+    /// Rounds colours as the stream will; the slab's first fit decides how coarsely.
+    fn quantize_colors(&mut self, report: &mut FitReport) -> Result<(), EncodeError> {
+        let step = match self.color_step {
+            Some(step) => step,
+            None => {
+                let step = color_step(report.rms_after);
+                self.writer.set_color_step(step)?;
+                *self.color_step.insert(step)
+            }
+        };
+        for wedge in &mut self.committed.wedges {
+            wedge.color = quantize_color(wedge.color, step);
+        }
+        report.rms_after = rounded_rms(report.rms_after, step);
+        Ok(())
     }
 
     /// Lets go of frames that no tet with an unsent vertex, nor any tet to come, reaches.

@@ -529,8 +529,7 @@ class Slab:
             if side is not None:
                 position[axis] = side
             elif axis != last:
-                k = min(floor((n[axis] + 1.0) * 2.5), 4)
-                position[axis] = predicted[axis] + self.coder.int("free", axis, scale_class(extent[axis]), k)
+                position[axis] = predicted[axis] + self.coder.int("free", axis, scale_class(extent[axis]))
             else:
                 position[axis] = self.parse_height(points, position, axis, (predicted[axis], extent[axis], n[axis]))
         return tuple(position)
@@ -555,7 +554,7 @@ class Slab:
         # The first with plane * (coordinate - a) > -rest.
         nearest = a[axis] + direction * (-rest // abs(plane[axis]) + 1)
         w = extent / abs(n)
-        m = floor(max(0.0, min(7.0, (predicted - nearest) * direction / w * 4.0)))
+        m = floor(max(0.0, min(4.0, (predicted - nearest) * direction / w * 4.0)))
         return nearest + direction * self.coder.uint("height", axis, scale_class(w), m)
 
 
@@ -582,7 +581,7 @@ def parse_header(data):
 
     for name in ("width", "height", "rate", "rate_base", "aspect", "aspect_base"):
         fields.append((name, varint()))
-    for name in ("subpixel_bits", "levels", "color_step"):
+    for name in ("subpixel_bits", "levels"):
         fields.append((name, data[at]))
         at += 1
     assert at == len(data), "the header ends where its length says"
@@ -612,7 +611,8 @@ def parse(stream):
         if flags & 1:
             (length,) = struct.unpack_from("<H", body)
             slab = Slab(parse_header(body[2 : 2 + length]))
-            body = body[2 + length :]
+            assert 1 <= body[2 + length] <= 128, "a colour step in range"
+            body = body[3 + length :]
         if flags & 2:
             slab.end_at(struct.unpack_from("<I", body)[0])
             body = body[4:]
