@@ -5,6 +5,7 @@
 
 mod config;
 mod observer;
+mod proof;
 mod quantize;
 mod rate;
 mod readiness;
@@ -19,7 +20,7 @@ use thiserror::Error;
 pub use self::config::{EncoderConfig, ErrorMetric, LatticeKind, SpeedPreset};
 use self::observer::Observer;
 pub use self::observer::{Event, Stage};
-use self::rate::RateControl;
+use self::rate::{ErrorControl, RateControl};
 use self::slab::{SlabEncoder, SlabEnd, WindowEncoder};
 use crate::bitstream::{IndexWriter, Packet, SequenceHeader, WriteError};
 use crate::vectorize::cleave::CleaveError;
@@ -62,6 +63,9 @@ pub enum EncodeError {
     /// The window's mesh could not be fitted.
     #[error("fit: {0}")]
     Fit(#[from] FitError),
+    /// The slab cannot be drawn.
+    #[error("proof: {0}")]
+    Proof(#[from] crate::render::ViewportError),
     /// The slab's mesh could not be written.
     #[error("stream: {0}")]
     Write(#[from] WriteError),
@@ -73,9 +77,10 @@ pub enum EncodeError {
 /// Vectorises a video: [`Encoder::send_frame`] in, [`Encoder::receive_packet`] out, [`Encoder::finish`] at the end.
 pub struct Encoder {
     config: EncoderConfig,
-    /// The settings of the current slab: where the bit rate decides, its ratio is the slab's own.
+    /// The settings of the current slab: where bit rate or error decide, its ratio or its target are the slab's own.
     slab_config: EncoderConfig,
     rate: Option<RateControl>,
+    error: Option<ErrorControl>,
     /// Bytes of the current slab so far.
     slab_bytes: u64,
     segmenter: Segmenter,
@@ -117,6 +122,7 @@ impl Encoder {
             finished: false,
             slab_config: config.clone(),
             rate: RateControl::new(&config),
+            error: ErrorControl::new(&config),
             slab_bytes: 0,
             #[cfg(feature = "threads")]
             pool: thread_pool(config.threads)?,
@@ -199,6 +205,9 @@ impl Encoder {
             if let Some(rate) = &self.rate {
                 self.slab_config.simplification_ratio = rate.simplification_ratio();
             }
+            if let Some(error) = &self.error {
+                self.slab_config.target_error = error.target();
+            }
             self.slab = Some(self.new_slab()?);
         }
         self.next_frame += 1;
@@ -231,6 +240,9 @@ impl Encoder {
             let bytes = std::mem::take(&mut self.slab_bytes);
             if let Some(rate) = &mut self.rate {
                 rate.end_slab(frames, finished.vertices, bytes);
+            }
+            if let (Some(control), Some(error)) = (&mut self.error, finished.error) {
+                control.end_slab(frames, error);
             }
         }
         Ok(())

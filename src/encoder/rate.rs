@@ -1,8 +1,8 @@
-//! Bit rate: how sparse the next slab's mesh must be.
+//! Goals for a whole stream, bit rate or error: what the next slab is to aim at.
 //!
-//! In: what slabs so far took. Out: the simplification ratio of the next one. Forbidden here: pictures, meshes.
+//! In: what slabs so far came to. Out: the next one's simplification ratio or error. Forbidden here: pictures, meshes.
 //!
-//! Bytes a vertex differ little within a clip, so the last slab's tell what vertices the next one can have. What a slab
+//! Bytes a vertex differ little within a clip, so the last slab's tell how many vertices the next one can have. What a slab
 //! took too much or too little is made good over the length of the next one.
 
 use super::EncoderConfig;
@@ -67,6 +67,38 @@ impl RateControl {
     }
 }
 
+/// A slab's target, at least and at most, over the stream's, whatever the slabs before it reached.
+const AIM: std::ops::RangeInclusive<f64> = 0.75..=1.25;
+
+/// Keeps a mean error from slab to slab.
+#[derive(Debug, Clone)]
+pub(super) struct ErrorControl {
+    target: f64,
+    /// Frames over which a difference is made good.
+    horizon: f64,
+    /// Sum over all frames so far of what the error was below the target.
+    saved: f64,
+}
+
+impl ErrorControl {
+    /// Control for the target error of `config`; `None` if it has none.
+    pub(super) fn new(config: &EncoderConfig) -> Option<Self> {
+        let EncoderConfig { target_error: target, key_int_max, .. } = *config;
+        (target > 0.0).then(|| Self { target, horizon: key_int_max.into(), saved: 0.0 })
+    }
+
+    /// The target error of the next slab.
+    pub(super) fn target(&self) -> f64 {
+        let aim = 1.0 + self.saved / self.horizon / self.target;
+        self.target * aim.clamp(*AIM.start(), *AIM.end())
+    }
+
+    /// A slab of so many frames has this mean absolute error.
+    pub(super) fn end_slab(&mut self, frames: u32, error: f64) {
+        self.saved += (self.target - error) * f64::from(frames);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -99,7 +131,21 @@ mod tests {
     }
 
     #[test]
-    fn without_a_rate_there_is_no_control() {
+    fn an_error_is_made_good() {
+        let config = EncoderConfig { target_error: 2.0, ..EncoderConfig::new(640, 360) };
+        let mut control = ErrorControl::new(&config).expect("a target");
+        assert_eq!(control.target(), 2.0);
+        control.end_slab(60, 2.3);
+        assert!((control.target() - 1.7).abs() < 1e-9);
+        control.end_slab(60, 1.7);
+        assert!((control.target() - 2.0).abs() < 1e-9);
+        control.end_slab(60, 9.0);
+        assert_eq!(control.target(), 1.5);
+    }
+
+    #[test]
+    fn without_a_goal_there_is_no_control() {
         assert!(RateControl::new(&EncoderConfig::new(640, 360)).is_none());
+        assert!(ErrorControl::new(&EncoderConfig::new(640, 360)).is_none());
     }
 }

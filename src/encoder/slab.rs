@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::observer::{Event, Observer, Stage};
+use super::proof::Proof;
 use super::quantize::{color_step, rounded_rms};
 use super::readiness::{FAR, hops};
 use super::runs::{Run, Runs};
@@ -45,10 +46,6 @@ pub(super) const ERROR_GAIN: f64 = 150.0;
 /// Most vertices that are fitted at once.
 const FIT_VERTICES: usize = 300_000;
 
-/// Mean absolute error over root mean square error, about that of a Laplacian's residuals: 0.55 to 0.61 on natural
-/// clips.
-const ABSOLUTE_OVER_RMS: f64 = 0.58;
-
 /// How a slab ends.
 #[derive(Debug)]
 pub(super) enum SlabEnd {
@@ -66,6 +63,8 @@ pub(super) struct FinishedSlab {
     pub(super) vertices: u64,
     /// What was learnt about [`ERROR_GAIN`].
     pub(super) error_gain: f64,
+    /// Mean absolute error, where the error decides.
+    pub(super) error: Option<f64>,
 }
 
 /// A slab's encoder, whatever its error metric.
@@ -96,6 +95,7 @@ pub(super) struct SlabEncoder<Q> {
     ratio: f64,
     target_error: f64,
     error_gain: f64,
+    proof: Proof,
     /// Frames behind the window's leading plane that are kept after a step.
     kept: u32,
     /// Packets that are fitted and written together, to look at each frame less often.
@@ -132,6 +132,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             ratio: config.simplification_ratio,
             target_error: config.target_error,
             error_gain,
+            proof: Proof::new(config),
             kept: config.kept_frames(),
             batch: config.window,
             simplify_params: SimplifyParams {
@@ -302,6 +303,9 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             packets.push(self.writer.write_packet(&self.committed, Some(k + 1) == frames)?);
         }
         observer.tell(Event::Ended);
+        if self.is_steered() {
+            self.follow_error(end)?;
+        }
         self.sent = end;
         self.forget_frames(&stars);
         Ok(packets)
@@ -344,11 +348,18 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             low = high;
         }
         self.quantize_colors(&mut total)?;
-        let reached = ABSOLUTE_OVER_RMS * total.rms_after;
-        if self.is_steered() && reached > 0.0 {
+        Ok(total)
+    }
+
+    /// Learns from the packets before frame `end`, which have just been written, what their error has come to.
+    fn follow_error(&mut self, end: u32) -> Result<(), EncodeError> {
+        let Some(mesh) = self.writer.coded_mesh() else { return Ok(()) };
+        let written = self.sent..end;
+        let frames = self.volume.frames().filter(|(number, _)| written.contains(number));
+        if let Some(reached) = self.proof.compare(mesh, frames)?.filter(|&reached| reached > 0.0) {
             self.error_gain *= (self.target_error / reached).powi(2).clamp(0.5, 2.0);
         }
-        Ok(total)
+        Ok(())
     }
 
     /// Rounds colours as the stream will; the slab's first fit decides how coarsely.
@@ -420,6 +431,6 @@ impl<Q: WedgeQuadric> WindowEncoder for SlabEncoder<Q> {
         self.committed.domain.duration = duration;
         let packets = self.advance(Some(frames), observer)?;
         let vertices = self.committed.positions.len() as u64;
-        Ok(FinishedSlab { packets, vertices, error_gain: self.error_gain })
+        Ok(FinishedSlab { packets, vertices, error_gain: self.error_gain, error: self.proof.error() })
     }
 }
