@@ -43,6 +43,14 @@ RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps
 step "examples and benches"
 cargo build --locked --workspace --examples --benches
 
+# Without coverage and for some seconds only: a look whether the targets still hold.
+step "fuzz targets"
+cargo clippy --locked --manifest-path fuzz/Cargo.toml --no-default-features -- -D warnings
+cargo build --locked --release --manifest-path fuzz/Cargo.toml --no-default-features
+for target in packets slab render round_trip feed; do
+    fuzz/target/release/drive "$target" 10
+done
+
 step "meson"
 # Meson refuses a build file dated in the future, which is what a clone has where the clock was set back since.
 touch meson.build

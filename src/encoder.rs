@@ -5,6 +5,9 @@
 
 mod config;
 mod observer;
+mod proof;
+mod quantize;
+mod rate;
 mod readiness;
 mod runs;
 mod slab;
@@ -17,6 +20,7 @@ use thiserror::Error;
 pub use self::config::{EncoderConfig, ErrorMetric, LatticeKind, SpeedPreset};
 use self::observer::Observer;
 pub use self::observer::{Event, Stage};
+use self::rate::{ErrorControl, RateControl};
 use self::slab::{SlabEncoder, SlabEnd, WindowEncoder};
 use crate::bitstream::{IndexWriter, Packet, SequenceHeader, WriteError};
 use crate::vectorize::cleave::CleaveError;
@@ -59,6 +63,9 @@ pub enum EncodeError {
     /// The window's mesh could not be fitted.
     #[error("fit: {0}")]
     Fit(#[from] FitError),
+    /// The slab cannot be drawn.
+    #[error("proof: {0}")]
+    Proof(#[from] crate::render::ViewportError),
     /// The slab's mesh could not be written.
     #[error("stream: {0}")]
     Write(#[from] WriteError),
@@ -70,6 +77,12 @@ pub enum EncodeError {
 /// Vectorises a video: [`Encoder::send_frame`] in, [`Encoder::receive_packet`] out, [`Encoder::finish`] at the end.
 pub struct Encoder {
     config: EncoderConfig,
+    /// The settings of the current slab: where bit rate or error decide, its ratio or its target are the slab's own.
+    slab_config: EncoderConfig,
+    rate: Option<RateControl>,
+    error: Option<ErrorControl>,
+    /// Bytes of the current slab so far.
+    slab_bytes: u64,
     segmenter: Segmenter,
     slab: Option<Box<dyn WindowEncoder>>,
     next_frame: u64,
@@ -107,6 +120,10 @@ impl Encoder {
             error_gain: slab::ERROR_GAIN,
             observer: Observer::default(),
             finished: false,
+            slab_config: config.clone(),
+            rate: RateControl::new(&config),
+            error: ErrorControl::new(&config),
+            slab_bytes: 0,
             #[cfg(feature = "threads")]
             pool: thread_pool(config.threads)?,
             config,
@@ -178,13 +195,19 @@ impl Encoder {
         if let Some(slab) = &self.slab {
             if self.segmenter.is_scene_cut(&frame) {
                 self.end_slab(SlabEnd::Held)?;
-            } else if force_keyframe || slab.planes() >= self.config.slab_frames() {
+            } else if force_keyframe || slab.planes() >= self.slab_config.slab_frames() {
                 let labels = self.observer.stage(Stage::Segment, || self.segmenter.push(&frame));
                 self.end_slab(SlabEnd::Joined(frame.clone(), labels))?;
             }
         }
         if self.slab.is_none() {
             self.segmenter.start_slab();
+            if let Some(rate) = &self.rate {
+                self.slab_config.simplification_ratio = rate.simplification_ratio();
+            }
+            if let Some(error) = &self.error {
+                self.slab_config.target_error = error.target();
+            }
             self.slab = Some(self.new_slab()?);
         }
         self.next_frame += 1;
@@ -199,20 +222,28 @@ impl Encoder {
     fn new_slab(&self) -> Result<Box<dyn WindowEncoder>, EncodeError> {
         Ok(match self.config.error_metric {
             ErrorMetric::Color => {
-                Box::new(SlabEncoder::<ColorQuadric>::try_new(&self.config, self.next_frame, self.error_gain)?)
+                Box::new(SlabEncoder::<ColorQuadric>::try_new(&self.slab_config, self.next_frame, self.error_gain)?)
             }
             ErrorMetric::Paper => {
-                Box::new(SlabEncoder::<DistanceQuadric>::try_new(&self.config, self.next_frame, self.error_gain)?)
+                Box::new(SlabEncoder::<DistanceQuadric>::try_new(&self.slab_config, self.next_frame, self.error_gain)?)
             }
         })
     }
 
     fn end_slab(&mut self, end: SlabEnd) -> Result<(), EncodeError> {
         if let Some(slab) = self.slab.take() {
+            let frames = slab.planes();
             let finished = slab.finish(end, &mut self.observer)?;
             self.vertices += finished.vertices;
             self.error_gain = finished.error_gain;
             self.queue(finished.packets);
+            let bytes = std::mem::take(&mut self.slab_bytes);
+            if let Some(rate) = &mut self.rate {
+                rate.end_slab(frames, finished.vertices, bytes);
+            }
+            if let (Some(control), Some(error)) = (&mut self.error, finished.error) {
+                control.end_slab(frames, error);
+            }
         }
         Ok(())
     }
@@ -220,6 +251,7 @@ impl Encoder {
     fn queue(&mut self, packets: Vec<Packet>) {
         for packet in packets {
             self.index.push(&packet);
+            self.slab_bytes += packet.data.len() as u64;
             self.ready.push_back(packet);
         }
     }

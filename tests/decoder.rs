@@ -27,7 +27,6 @@ fn slab(first_frame: u64, seed: u64) -> (Vec<Packet>, TetMesh) {
         pixel_aspect_ratio: Fraction { numerator: 1, denominator: 1 },
         subpixel_bits: domain.subpixel_bits,
         subdivision_levels: 1,
-        color_step: 16,
     };
     let mut writer = SlabWriter::try_new(header, first_frame).expect("a header in range");
     let packets = (0..FRAMES).map(|k| writer.write_packet(&mesh, k + 1 == FRAMES).expect("a tiling")).collect();
@@ -123,6 +122,48 @@ fn errors_leave_the_picture_and_wait_for_a_keyframe() {
     assert!(picture(&mut decoder, 9.0).is_ok());
     decoder.flush();
     assert_eq!(picture(&mut decoder, 9.0), Err(DecodeError::NoKeyframe));
+}
+
+/// Pictures of a slab's frames, each drawn after its packet, whether that is good or not.
+fn play(decoder: &mut Decoder, packets: &[Packet]) -> Vec<Result<Vec<u8>, DecodeError>> {
+    let mut draw = |packet: &Packet| {
+        let _ = decoder.send_packet(&packet.data);
+        picture(decoder, packet.frame_number as f64)
+    };
+    packets.iter().map(&mut draw).collect()
+}
+
+#[test]
+fn a_lost_packet_costs_the_rest_of_its_slab_and_the_last_picture_stays() {
+    let (first, _) = slab(0, 3);
+    let (second, _) = slab(9, 4);
+    let whole = [first.clone(), second.clone()].map(|packets| play(&mut decoder(1), &packets));
+    for lost in 0..first.len() {
+        let mut decoder = decoder(1);
+        let kept: Vec<Packet> =
+            first.iter().enumerate().filter(|&(k, _)| k != lost).map(|(_, packet)| packet.clone()).collect();
+        let shown = play(&mut decoder, &kept);
+        assert_eq!(shown[..lost], whole[0][..lost]);
+        // The mesh that has come is held at the end of what it is complete for.
+        let held = if lost == 0 { Err(DecodeError::NoKeyframe) } else { picture(&mut decoder, 1e6) };
+        assert!(shown[lost..].iter().all(|picture| *picture == held), "packet {lost}");
+        assert_eq!(play(&mut decoder, &second), whole[1]);
+    }
+}
+
+#[test]
+fn streams_are_joined_late_and_continued_by_others() {
+    let (first, _) = slab(0, 3);
+    let (second, _) = slab(9, 4);
+    // A stream of its own, which counts from 0 again.
+    let (other, _) = slab(0, 5);
+    let alone = [&second, &other].map(|packets| play(&mut decoder(1), packets));
+    for joined in 1..first.len() {
+        let mut decoder = decoder(1);
+        assert!(play(&mut decoder, &first[joined..]).iter().all(|p| *p == Err(DecodeError::NoKeyframe)));
+        assert_eq!(play(&mut decoder, &second), alone[0]);
+        assert_eq!(play(&mut decoder, &other), alone[1]);
+    }
 }
 
 #[test]

@@ -16,6 +16,9 @@ pub(crate) struct Settings {
     /// Mean absolute error to simplify up to, in levels; 0: off.
     #[arg(long, default_value_t = 0.0)]
     target_error: f64,
+    /// Kilobits a second; 0: off.
+    #[arg(long, default_value_t = 0)]
+    bitrate: u32,
     /// Most frames from one keyframe to the next.
     #[arg(long, default_value_t = 60)]
     key_int_max: u32,
@@ -82,6 +85,7 @@ impl Settings {
         EncoderConfig {
             simplification_ratio: self.simplification_ratio,
             target_error: self.target_error,
+            bitrate: self.bitrate,
             key_int_max: self.key_int_max,
             window: self.window.unwrap_or(base.window),
             superpixels: self.superpixels.unwrap_or(base.superpixels),

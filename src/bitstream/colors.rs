@@ -5,6 +5,7 @@
 use glam::Vec3;
 
 use super::MeshFault;
+use super::bits::Part;
 use super::range_coder::BitCoder;
 use super::symbols::IntModel;
 
@@ -16,6 +17,13 @@ const LEVELS: [i32; 2] = [-128, 383];
 
 /// Steps are counted in 1/16 of a level.
 const STEPS_A_LEVEL: i32 = 16;
+
+/// Quantisation steps of colours that a slab may have, in 1/16 of an 8-bit level.
+pub const COLOR_STEPS: std::ops::RangeInclusive<u8> = 1..=128;
+
+/// The quantisation step of a slab that has chosen none: 2 levels.
+#[cfg(feature = "encode")]
+pub(super) const DEFAULT_COLOR_STEP: u8 = 32;
 
 /// Range of a channel in steps of `step` sixteenths.
 fn step_range(step: u8) -> [i32; 2] {
@@ -35,84 +43,125 @@ pub(super) fn from_steps(steps: Steps, step: u8) -> Vec3 {
     Vec3::from_array(steps.map(|s| (s * i32::from(step)) as f32 / STEPS_A_LEVEL as f32))
 }
 
-/// What a colour (8-bit levels) will be after the stream, with a sequence's `color_step`.
+/// What a colour (8-bit levels) will be after the stream, with a slab's `color_step`.
 #[cfg(feature = "encode")]
 pub fn quantize_color(color: Vec3, color_step: u8) -> Vec3 {
     from_steps(to_steps(color, color_step), color_step)
 }
 
-/// Classes of how much the known colours around a wedge differ; the last three are for one known, the label's last
-/// and none.
-const SPREADS: usize = 12;
+/// Classes of how uncertain a prediction is: the binary logarithm of a variance, then one for a single wedge known and
+/// one for none.
+const CLASSES: usize = 18;
 /// Classes of the residual of green, the context of those of red and blue.
 const GREEN_CLASSES: usize = 4;
 
-/// What a wedge's colour is predicted from.
+/// Largest magnitude of a residual that [`Slope`] learns from.
+const LEARNT_MAX: i64 = 255;
+/// Window of its averages, as a power of two.
+const SLOPE_SHIFT: u32 = 10;
+
+/// Magnitudes of a coded colour's residuals: green's, and the sum of the others'.
+pub(super) type Misses = [u16; 2];
+
+/// Green, red less green, blue less green: what is predicted.
+fn to_channels([red, green, blue]: Steps) -> [i64; 3] {
+    [green, red - green, blue - green].map(i64::from)
+}
+
+/// What a wedge's colour is predicted from: sums over the known wedges of its star, as often as tets have them.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Around {
+    count: i64,
+    sum: [i64; 3],
+    squares: [i64; 3],
+    misses: [i64; 2],
+}
+
+impl Around {
+    /// Takes a wedge in.
+    pub(super) fn add(&mut self, steps: Steps, misses: Misses) {
+        self.count += 1;
+        for (channel, value) in to_channels(steps).into_iter().enumerate() {
+            self.sum[channel] += value;
+            self.squares[channel] += value * value;
+        }
+        for (sum, miss) in self.misses.iter_mut().zip(misses) {
+            *sum += i64::from(miss);
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// The mean, rounded; 0 of nothing.
+    fn prediction(&self) -> [i64; 3] {
+        let n = self.count.max(1);
+        self.sum.map(|sum| (2 * sum + n).div_euclid(2 * n))
+    }
+
+    /// The square of the count times the variance of a channel.
+    fn variance(&self, channel: usize) -> i64 {
+        self.count * self.squares[channel] - self.sum[channel] * self.sum[channel]
+    }
+
+    /// Class of how uncertain the prediction is: how much the wedges around differ, and how badly they were predicted.
+    fn class(&self, variance: i64, misses: i64) -> usize {
+        match self.count {
+            0 => CLASSES - 2,
+            1 => CLASSES - 1,
+            n => ((4 * (variance + misses * misses) / (n * n) + 1).ilog2() as usize).min(CLASSES - 3),
+        }
+    }
+}
+
+/// How one residual follows another: the slope of a line through 0, fitted to the last some thousand.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Around {
-    /// The tet's other wedges.
-    Tet {
-        /// How many, 1 to 3.
-        count: u32,
-        /// Weighted mean of their colours.
-        mean: Steps,
-        /// Greatest less least green.
-        spread: u32,
-    },
-    /// The last wedge coded with this label.
-    Label(Steps),
-    /// Another label's wedge at the vertex, or nothing.
-    Other(Steps),
+struct Slope {
+    products: i64,
+    squares: i64,
+}
+
+impl Slope {
+    const NEW: Self = Self { products: 0, squares: 64 };
+
+    fn predict(&self, from: i64) -> i64 {
+        (2 * self.products * from + self.squares).div_euclid(2 * self.squares)
+    }
+
+    fn learn(&mut self, from: i64, to: i64) {
+        let [from, to] = [from, to].map(|residual| residual.clamp(-LEARNT_MAX, LEARNT_MAX));
+        self.products += from * to - (self.products >> SLOPE_SHIFT);
+        self.squares += from * from - (self.squares >> SLOPE_SHIFT);
+    }
 }
 
 /// Models of colour residuals.
 #[derive(Debug, Clone)]
 pub(super) struct ColorModels {
-    green: [IntModel; SPREADS],
-    red: [[IntModel; GREEN_CLASSES]; SPREADS],
-    blue: [[IntModel; GREEN_CLASSES]; SPREADS],
+    green: [IntModel; CLASSES],
+    red: [[IntModel; GREEN_CLASSES]; CLASSES],
+    blue: [[IntModel; GREEN_CLASSES]; CLASSES],
+    red_of_green: Slope,
+    blue_of_green: Slope,
+    blue_of_red: Slope,
 }
 
 impl ColorModels {
     pub(super) const NEW: Self = Self {
-        green: [const { IntModel::NEW }; SPREADS],
-        red: [const { [const { IntModel::NEW }; GREEN_CLASSES] }; SPREADS],
-        blue: [const { [const { IntModel::NEW }; GREEN_CLASSES] }; SPREADS],
+        green: [const { IntModel::NEW }; CLASSES],
+        red: [const { [const { IntModel::NEW }; GREEN_CLASSES] }; CLASSES],
+        blue: [const { [const { IntModel::NEW }; GREEN_CLASSES] }; CLASSES],
+        red_of_green: Slope::NEW,
+        blue_of_green: Slope::NEW,
+        blue_of_red: Slope::NEW,
     };
 }
 
-impl Around {
-    /// What the other wedges of a tet tell, each with its weight > 0; `None` if there are none.
-    pub(super) fn of_tet(known: impl Iterator<Item = (Steps, f64)>) -> Option<Self> {
-        let (mut total, mut sum) = (0.0, [0.0; 3]);
-        let (mut count, mut low, mut high) = (0, i32::MAX, i32::MIN);
-        for (steps, weight) in known {
-            total += weight;
-            sum = [0, 1, 2].map(|c| sum[c] + weight * f64::from(steps[c]));
-            (count, low, high) = (count + 1, low.min(steps[1]), high.max(steps[1]));
-        }
-        let mean = sum.map(|channel| (channel / total + 0.5).floor() as i32);
-        (count > 0).then(|| Self::Tet { count, mean, spread: high.abs_diff(low) })
-    }
-
-    fn prediction(&self) -> Steps {
-        match *self {
-            Self::Tet { mean, .. } => mean,
-            Self::Label(steps) | Self::Other(steps) => steps,
-        }
-    }
-
-    fn class(&self) -> usize {
-        match *self {
-            Self::Tet { count: 1, .. } => SPREADS - 3,
-            Self::Tet { spread, .. } => ((spread + 1).ilog2() as usize).min(SPREADS - 4),
-            Self::Label(_) => SPREADS - 2,
-            Self::Other(_) => SPREADS - 1,
-        }
-    }
-}
-
-/// Codes a wedge's colour: the residual of green, then those of red and blue less that of green.
+/// Codes a wedge's colour. Returns it with the magnitudes of its residuals.
+///
+/// The residuals of the three channels still hang together, from clip to clip in another way, so what is left of red is
+/// predicted from green's, and of blue from both.
 ///
 /// # Errors
 /// A colour outside the range of the format.
@@ -122,26 +171,41 @@ pub(super) fn code_color(
     around: &Around,
     step: u8,
     truth: Steps,
-) -> Result<Steps, MeshFault> {
+) -> Result<(Steps, Misses), MeshFault> {
     let predicted = around.prediction();
-    let class = around.class();
-    let residual = [0, 1, 2].map(|c| truth[c] - predicted[c]);
-    let green = models.green[class].code(coder, residual[1]);
+    let truth = to_channels(truth);
+    let residual = [0, 1, 2].map(|channel| truth[channel] - predicted[channel]);
+    let [luma, chroma] = [(around.variance(0), 0), (around.variance(1) + around.variance(2), 1)]
+        .map(|(v, m)| around.class(v, around.misses[m]));
+
+    coder.enter(Part::Luma);
+    let green = code_residual(coder, &mut models.green[luma], residual[0]);
+    coder.enter(Part::Chroma);
     let context = (green.unsigned_abs().min(7) + 1).ilog2() as usize;
-    let red = models.red[class][context].code(coder, residual[0] - residual[1]);
-    let blue = models.blue[class][context].code(coder, residual[2] - residual[1]);
-    let [low, high] = step_range(step);
-    let mut steps = [0; 3];
-    for (channel, (part, shared)) in [(red, green), (green, 0), (blue, green)].into_iter().enumerate() {
-        let found = i64::from(predicted[channel]) + i64::from(part) + i64::from(shared);
-        steps[channel] = i32::try_from(found).ok().filter(|s| (low..=high).contains(s)).ok_or(MeshFault::Range {
-            field: "color",
-            low: low.into(),
-            high: high.into(),
-            found,
-        })?;
+    let along = models.red_of_green.predict(green);
+    let red = code_residual(coder, &mut models.red[chroma][context], residual[1] - along);
+    models.red_of_green.learn(green, along + red);
+    let along_red = models.blue_of_red.predict(red);
+    let along_green = models.blue_of_green.predict(green);
+    let blue = code_residual(coder, &mut models.blue[chroma][context], residual[2] - along_green - along_red);
+    models.blue_of_green.learn(green, along_green + along_red + blue);
+    models.blue_of_red.learn(red, along_red + blue);
+
+    let found = predicted[0] + green;
+    let found = [found + predicted[1] + along + red, found, found + predicted[2] + along_green + along_red + blue];
+    let [low, high] = step_range(step).map(i64::from);
+    if let Some(found) = found.into_iter().find(|channel| !(low..=high).contains(channel)) {
+        return Err(MeshFault::Range { field: "color", low, high, found });
     }
-    Ok(steps)
+    let miss = |residual: u64| residual.min(u16::MAX.into()) as u16;
+    let misses = [miss(green.unsigned_abs()), miss(red.unsigned_abs() + blue.unsigned_abs())];
+    Ok((found.map(|channel| channel as i32), misses))
+}
+
+/// Codes a residual; the parser's `truth` is not looked at, and may be anything.
+fn code_residual(coder: &mut impl BitCoder, model: &mut IntModel, truth: i64) -> i64 {
+    const LIMIT: i64 = 1 << 24;
+    model.code(coder, truth.clamp(-LIMIT, LIMIT) as i32).into()
 }
 
 #[cfg(all(test, feature = "encode"))]

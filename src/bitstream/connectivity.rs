@@ -7,21 +7,30 @@
 //! whether the new corner closes the gap to a neighbouring open face, is a new vertex, or lies elsewhere on the front.
 //! Unlike there, the mesh's geometry is known to both sides before its connectivity: the gap at an edge between two
 //! open faces is either sharp, then almost surely closed by one tet, or wide. So the sharpest gap at the focus comes
-//! first, and its angle is the context.
+//! first, and its angle is the context. Meshes are long in time where nothing moves, so angles and distances are
+//! measured in the extents of the edges around.
 
-use glam::DVec3;
+use glam::{DVec3, IVec3};
 
 use super::MeshFault;
+use super::bits::Part;
+use super::extents::{Extents, PARTS};
 use super::front::Front;
+use super::near::{far_vertices, near_vertices};
 use super::range_coder::{BitCoder, BitModel};
 use super::symbols::UintModel;
 use crate::mesh::{TetMesh, VertexId, volume6};
 
 /// Open faces of one vertex that are looked at. Typical vertices have six; a hub of thousands stays cheap.
-const SCAN: usize = 24;
+pub(super) const SCAN: usize = 24;
 
 /// Classes of cos(angle) of a gap.
-const ANGLES: usize = 12;
+const ANGLES: usize = 16;
+
+/// Squares of distances, in extents, between which classes of distance lie.
+const DISTANCES: [f64; 7] = [0.75, 1.25, 1.75, 2.75, 4.0, 6.0, 9.0];
+/// Classes of distance.
+const RANGES: usize = DISTANCES.len() + 1;
 
 /// What lies behind a gate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,29 +62,61 @@ pub(super) struct Gate {
     pub(super) face: u32,
     /// Its corners, the focus first.
     pub(super) corners: [VertexId; 3],
+    /// Sum of the extents at its corners.
+    pub(super) extent: IVec3,
+    /// Vertices of the open faces across its edges: from third corner to first, first to second, second to third.
+    pub(super) across: [Option<VertexId>; 3],
     candidates: [Option<Candidate>; 3],
+}
+
+impl Gate {
+    pub(super) fn has_candidate(&self, vertex: VertexId) -> bool {
+        self.candidates.iter().flatten().any(|c| c.vertex == vertex)
+    }
+
+    /// Whether the tet of the gate and `apex` is positive.
+    pub(super) fn is_positive(&self, mesh: &TetMesh, apex: VertexId) -> bool {
+        is_positive(mesh, self.corners, apex)
+    }
+
+    /// Square of the distance of a vertex from the gate's centre, in extents.
+    pub(super) fn distance2(&self, mesh: &TetMesh, vertex: VertexId) -> f64 {
+        let at = |v: VertexId| mesh.positions[v.index()];
+        let [a, b, c] = self.corners.map(at);
+        let d = (3 * at(vertex) - (a + b + c)).as_dvec3() / self.extent.as_dvec3();
+        f64::from(PARTS * PARTS) * (d.x * d.x + d.y * d.y + d.z * d.z)
+    }
+
+    /// Class of that distance.
+    fn range(&self, mesh: &TetMesh, vertex: VertexId) -> usize {
+        let distance2 = self.distance2(mesh, vertex);
+        DISTANCES.iter().filter(|&&limit| distance2 > limit).count()
+    }
 }
 
 /// Models of the apex symbols.
 #[derive(Debug, Clone)]
 pub(super) struct ConnectivityModels {
-    /// By place in the order of candidates, edges, angle.
-    join: [[[BitModel; ANGLES]; 3]; 3],
-    /// By number of candidates, angle of the sharpest.
-    new: [[BitModel; ANGLES]; 4],
-    /// Rank among the front's vertices around the gate, plus 1; 0: not among them.
-    rank: UintModel,
+    /// By place in the order of candidates, edges, angle, distance.
+    join: [[[[BitModel; RANGES]; ANGLES]; 3]; 3],
+    /// By number of candidates, angle and distance of the first.
+    new: [[[BitModel; RANGES]; ANGLES]; 4],
+    /// Rank among the front's vertices near the gate, plus 1; 0: not among them.
+    near: UintModel,
     nothing: BitModel,
     top: BitModel,
+    /// Rank among those one ring farther, plus 1; 0: not among them.
+    far: UintModel,
 }
 
 impl ConnectivityModels {
     pub(super) const NEW: Self = Self {
-        join: [[[BitModel::NEW; ANGLES]; 3]; 3],
-        new: [[BitModel::NEW; ANGLES]; 4],
-        rank: UintModel::NEW,
+        join: [[[[BitModel::NEW; RANGES]; ANGLES]; 3]; 3],
+        new: [[[BitModel::NEW; RANGES]; ANGLES]; 4],
+        near: UintModel::NEW,
         nothing: BitModel::NEW,
         top: BitModel::NEW,
+        far: UintModel::NEW,
     };
 }
 
@@ -85,18 +126,21 @@ fn angle_class(cos: f64) -> usize {
 }
 
 /// Whether the tet of `corners` and `apex` is positive.
+#[inline]
 fn is_positive(mesh: &TetMesh, [a, b, c]: [VertexId; 3], apex: VertexId) -> bool {
     let at = |v: VertexId| mesh.positions[v.index()];
     volume6(at(a), at(b), at(c), at(apex)) > 0
 }
 
-/// Cosine of the angle between two open faces with a common edge and these unit normals, measured on the open side; angles beyond 180 degrees are the caller's to exclude.
+/// Cosine of the angle between two open faces with a common edge and these unit normals, measured on the open side;
+/// angles beyond 180 degrees are the caller's to exclude.
 fn gap_cos(n: DVec3, m: DVec3) -> f64 {
     -(n.x * m.x + n.y * m.y + n.z * m.z)
 }
 
 /// The youngest open faces of a vertex, as columns: they are compared all with all.
-struct Fan {
+#[derive(Debug, Clone)]
+pub(super) struct Fan {
     count: usize,
     faces: [u32; SCAN],
     /// The corner after the focus, anticlockwise.
@@ -107,22 +151,24 @@ struct Fan {
 }
 
 impl Fan {
-    fn gather(front: &Front, focus: VertexId) -> Self {
-        let mut fan = Self {
-            count: 0,
-            faces: [0; SCAN],
-            second: [focus; SCAN],
-            third: [focus; SCAN],
-            normals: [DVec3::ZERO; SCAN],
-        };
-        for (place, (face, [_, second, third])) in front.at(focus).take(SCAN).enumerate() {
-            fan.faces[place] = face;
-            fan.second[place] = second;
-            fan.third[place] = third;
-            fan.normals[place] = front.face(face).normal;
-            fan.count = place + 1;
+    pub(super) const NEW: Self = Self {
+        count: 0,
+        faces: [0; SCAN],
+        second: [VertexId(0); SCAN],
+        third: [VertexId(0); SCAN],
+        normals: [DVec3::ZERO; SCAN],
+    };
+
+    fn gather(&mut self, front: &Front, focus: VertexId) {
+        self.count = 0;
+        for (face, [_, second, third]) in front.at(focus).take(SCAN) {
+            let place = self.count;
+            self.faces[place] = face;
+            self.second[place] = second;
+            self.third[place] = third;
+            self.normals[place] = front.face(face).normal;
+            self.count += 1;
         }
-        fan
     }
 
     /// The youngest face that follows face `place` around the focus.
@@ -153,9 +199,14 @@ impl Fan {
 }
 
 /// The open face at `focus` to close next: the one before the sharpest gap at an edge of `focus`, going around it
-/// anticlockwise. `None`: all faces at `focus` are closed.
-pub(super) fn choose_gate(front: &Front, mesh: &TetMesh, focus: VertexId) -> Option<Gate> {
-    let fan = Fan::gather(front, focus);
+/// anticlockwise. `None`: all faces at `focus` are closed. `fan` is room to work in.
+pub(super) fn choose_gate(
+    fan: &mut Fan,
+    (front, mesh): (&Front, &TetMesh),
+    extents: &Extents,
+    focus: VertexId,
+) -> Option<Gate> {
+    fan.gather(front, focus);
     if fan.count == 0 {
         return None;
     }
@@ -178,7 +229,13 @@ pub(super) fn choose_gate(front: &Front, mesh: &TetMesh, focus: VertexId) -> Opt
         let (a, b) = (key(a), key(b));
         b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
     });
-    Some(Gate { face: fan.faces[place], corners, candidates })
+    Some(Gate {
+        face: fan.faces[place],
+        corners,
+        extent: extents.around(corners),
+        across: across.map(|found| found.map(|(vertex, _)| vertex)),
+        candidates,
+    })
 }
 
 /// The vertex and the normal of the youngest open face across the gate's edge opposite the focus.
@@ -221,34 +278,49 @@ pub(super) fn code_apex(
     gate: &Gate,
     truth: Apex,
 ) -> Result<Apex, MeshFault> {
+    coder.enter(Part::Connectivity);
+    let mut first = (0, 0);
+    let mut count = 0;
     for (place, candidate) in gate.candidates.iter().flatten().enumerate() {
-        let model = &mut models.join[place][candidate.edges - 1][angle_class(candidate.cos)];
+        let (angle, range) = (angle_class(candidate.cos), gate.range(mesh, candidate.vertex));
+        let model = &mut models.join[place][candidate.edges - 1][angle][range];
         if coder.bit(model, truth == Apex::Known(candidate.vertex)) {
             return Ok(Apex::Known(candidate.vertex));
         }
+        if place == 0 {
+            first = (angle, range);
+        }
+        count = place + 1;
     }
-    let sharpest = gate.candidates[0].map_or(0, |c| angle_class(c.cos));
-    let model = &mut models.new[gate.candidates.iter().flatten().count()][sharpest];
-    if coder.bit(model, truth == Apex::New) {
+    if coder.bit(&mut models.new[count][first.0][first.1], truth == Apex::New) {
         return Ok(Apex::New);
     }
-    let near = near_vertices(front, mesh, gate);
-    let rank = near.iter().position(|&(_, v)| truth == Apex::Known(v)).map_or(0, |rank| rank as u32 + 1);
-    let rank = models.rank.code(coder, rank);
-    if rank > 0 {
-        let expected = near.len() as u32;
-        let found = near.get(rank as usize - 1);
-        return found.map(|&(_, v)| Apex::Known(v)).ok_or(MeshFault::Reference {
-            field: "vertex near the gate",
-            expected,
-            found: rank - 1,
-        });
+    if let Some(near) = code_rank(coder, &mut models.near, &near_vertices(front, mesh, gate), truth)? {
+        return Ok(Apex::Known(near));
     }
     if coder.bit(&mut models.nothing, matches!(truth, Apex::Hole | Apex::Top)) {
         return Ok(if coder.bit(&mut models.top, truth == Apex::Top) { Apex::Top } else { Apex::Hole });
     }
+    if let Some(far) = code_rank(coder, &mut models.far, &far_vertices(front, mesh, gate), truth)? {
+        return Ok(Apex::Known(far));
+    }
     let known = if let Apex::Known(v) = truth { v } else { VertexId(0) };
     code_vertex_id(coder, known, mesh.positions.len() as u32).map(Apex::Known)
+}
+
+/// Codes which of the `ranked` vertices the apex is, if it is one of them.
+fn code_rank(
+    coder: &mut impl BitCoder,
+    model: &mut UintModel,
+    ranked: &[VertexId],
+    truth: Apex,
+) -> Result<Option<VertexId>, MeshFault> {
+    let rank = ranked.iter().position(|&v| truth == Apex::Known(v)).map_or(0, |place| place as u32 + 1);
+    let rank = model.code(coder, rank);
+    let Some(place) = rank.checked_sub(1) else { return Ok(None) };
+    let expected = ranked.len() as u32;
+    let fault = MeshFault::Reference { field: "vertex near the gate", expected, found: place };
+    ranked.get(place as usize).copied().map(Some).ok_or(fault)
 }
 
 /// Codes a reference to one of `count` vertices as a plain number.
@@ -259,30 +331,4 @@ pub(super) fn code_vertex_id(coder: &mut impl BitCoder, truth: VertexId, count: 
     } else {
         Err(MeshFault::Reference { field: "vertex", expected: count, found })
     }
-}
-
-/// The front's vertices around the gate that make a positive tet with it and are not candidates, nearest to the
-/// gate's reflection first, each with the square of thrice its distance; ties by id.
-fn near_vertices(front: &Front, mesh: &TetMesh, gate: &Gate) -> Vec<(f64, VertexId)> {
-    let mut near: Vec<VertexId> = Vec::with_capacity(2 * SCAN);
-    for corner in gate.corners {
-        near.extend(front.at(corner).take(SCAN).flat_map(|(_, [_, second, third])| [second, third]));
-    }
-    near.sort_unstable();
-    near.dedup();
-    let is_candidate = |v| gate.candidates.iter().flatten().any(|c| c.vertex == v);
-    near.retain(|&v| !is_candidate(v) && is_positive(mesh, gate.corners, v));
-    let at = |v: VertexId| mesh.positions[v.index()];
-    let behind = mesh.tet_vertices(front.face(gate.face).tet as usize);
-    let opposite = behind.into_iter().find(|v| !gate.corners.contains(v)).unwrap_or(behind[0]);
-    let center3 = gate.corners.into_iter().map(at).sum::<glam::IVec3>();
-    // Thrice the position, to stay with integers: 2 (a + b + c) - 3 e.
-    let reflected3 = 2 * center3 - 3 * at(opposite);
-    let distance = |v: VertexId| {
-        let d = front.metric().vector(reflected3, 3 * at(v));
-        d.x * d.x + d.y * d.y + d.z * d.z
-    };
-    let mut ranked: Vec<(f64, VertexId)> = near.into_iter().map(|v| (distance(v), v)).collect();
-    ranked.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    ranked
 }

@@ -170,6 +170,12 @@ pub enum WriteError {
     /// The sequence header is one that no parser would accept.
     #[error("sequence header: {0}")]
     Header(#[source] ParseError),
+    /// The colours' step is out of its range, or set after the first packet.
+    #[error("color step: expected 1 to 128 before the first packet, found {found}")]
+    ColorStep {
+        /// The step.
+        found: u8,
+    },
     /// The mesh's box or lattice is not the header's.
     #[error("domain: expected {expected:?}, found {found:?}")]
     Domain {

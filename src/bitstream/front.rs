@@ -11,9 +11,6 @@ use crate::mesh::{FaceMap, VertexId};
 /// End of a list.
 const NONE: u32 = u32::MAX;
 
-/// Largest power of two between the scales of time and space.
-pub(super) const MAX_TIME_SHIFT: u8 = 8;
-
 /// A face with a coded tet on one side only.
 #[derive(Debug, Clone)]
 pub(super) struct OpenFace {
@@ -21,44 +18,27 @@ pub(super) struct OpenFace {
     pub(super) corners: [VertexId; 3],
     /// The coded tet behind it.
     pub(super) tet: u32,
-    /// Unit normal in the metric of the slab, pointing to the open side.
+    /// Unit normal, measured in the extents of edges around it, pointing to the open side.
     pub(super) normal: DVec3,
     next: [u32; 3],
     prev: [u32; 3],
 }
 
-/// The metric in which angles are compared: t is scaled so that edges are about as long in time as in space.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Metric {
-    time: f64,
-}
-
-impl Metric {
-    /// Time counts 2^`time_shift` times as much as a lattice unit of space.
-    pub(super) fn new(time_shift: i8) -> Self {
-        let scale = f64::from(1u32 << time_shift.unsigned_abs().min(MAX_TIME_SHIFT));
-        Self { time: if time_shift < 0 { 1.0 / scale } else { scale } }
-    }
-
-    /// Difference of two positions in this metric. Exact: small integers times a power of two.
-    pub(super) fn vector(self, from: IVec3, to: IVec3) -> DVec3 {
-        let d = (to - from).as_dvec3();
-        DVec3::new(d.x, d.y, d.z * self.time)
-    }
-
-    /// Unit normal of (a, b, c), not collinear. Every operation is one of IEEE 754's correctly rounded ones, so all
-    /// machines agree on it.
-    fn normal(self, [a, b, c]: [IVec3; 3]) -> DVec3 {
-        let (u, v) = (self.vector(a, b), self.vector(a, c));
-        let n = DVec3::new(u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x);
-        n / (n.x * n.x + n.y * n.y + n.z * n.z).sqrt()
-    }
+/// Unit normal of (a, b, c), not collinear, where each axis is measured in units of `scale`. Every operation is one of
+/// IEEE 754's correctly rounded ones, so all machines agree on it.
+pub(super) fn unit_normal([a, b, c]: [IVec3; 3], scale: DVec3) -> DVec3 {
+    let (u, v) = ((b - a).as_dvec3(), (c - a).as_dvec3());
+    let n = DVec3::new(
+        (u.y * v.z - u.z * v.y) * scale.x,
+        (u.z * v.x - u.x * v.z) * scale.y,
+        (u.x * v.y - u.y * v.x) * scale.z,
+    );
+    n / (n.x * n.x + n.y * n.y + n.z * n.z).sqrt()
 }
 
 /// The open faces, listed at each of their vertices, the youngest first.
 #[derive(Debug, Clone)]
 pub(super) struct Front {
-    metric: Metric,
     faces: Vec<OpenFace>,
     free: Vec<u32>,
     /// Per vertex: first slot of its list; slot 3 f + c is corner c of face f.
@@ -81,19 +61,8 @@ fn canonical([a, b, c]: [VertexId; 3]) -> [VertexId; 3] {
 }
 
 impl Front {
-    pub(super) fn new(metric: Metric) -> Self {
-        Self {
-            metric,
-            faces: Vec::new(),
-            free: Vec::new(),
-            head: Vec::new(),
-            count: Vec::new(),
-            by_corners: FaceMap::new(),
-        }
-    }
-
-    pub(super) fn metric(&self) -> Metric {
-        self.metric
+    pub(super) fn new() -> Self {
+        Self { faces: Vec::new(), free: Vec::new(), head: Vec::new(), count: Vec::new(), by_corners: FaceMap::new() }
     }
 
     /// Makes room for the lists of one more vertex.
@@ -127,9 +96,9 @@ impl Front {
         self.by_corners.get(canonical([a, c, b])).copied()
     }
 
-    /// Adds an open face of `tet`, whose corners are at `positions`.
-    pub(super) fn insert(&mut self, corners: [VertexId; 3], positions: [IVec3; 3], tet: u32) -> Result<(), MeshFault> {
-        let open = OpenFace { corners, tet, normal: self.metric.normal(positions), next: [NONE; 3], prev: [NONE; 3] };
+    /// Adds an open face of `tet` with this unit normal.
+    pub(super) fn insert(&mut self, corners: [VertexId; 3], normal: DVec3, tet: u32) -> Result<(), MeshFault> {
+        let open = OpenFace { corners, tet, normal, next: [NONE; 3], prev: [NONE; 3] };
         let face = match self.free.pop() {
             Some(face) => {
                 self.faces[face as usize] = open;
@@ -157,7 +126,7 @@ impl Front {
 
     /// Takes an open face out.
     pub(super) fn remove(&mut self, face: u32) {
-        let OpenFace { corners, next, prev, .. } = self.faces[face as usize].clone();
+        let OpenFace { corners, next, prev, .. } = self.faces[face as usize];
         for (corner, vertex) in corners.into_iter().enumerate() {
             let (after, before) = (next[corner], prev[corner]);
             if before == NONE {
@@ -180,11 +149,10 @@ mod tests {
     use super::*;
 
     fn front_of_four() -> Front {
-        let mut front = Front::new(Metric::new(0));
-        let at = [IVec3::ZERO, IVec3::X, IVec3::Y, IVec3::Z];
-        at.iter().for_each(|_| front.push_vertex());
+        let mut front = Front::new();
+        (0..4).for_each(|_| front.push_vertex());
         for corners in crate::mesh::FACES {
-            front.insert(corners.map(|c| VertexId(c as u32)), corners.map(|c| at[c]), 0).unwrap();
+            front.insert(corners.map(|c| VertexId(c as u32)), DVec3::X, 0).unwrap();
         }
         front
     }
@@ -207,14 +175,13 @@ mod tests {
     #[test]
     fn a_face_is_open_once() {
         let mut front = front_of_four();
-        let again = front.insert([VertexId(2), VertexId(3), VertexId(1)], [IVec3::X, IVec3::Y, IVec3::Z], 7);
+        let again = front.insert([VertexId(2), VertexId(3), VertexId(1)], DVec3::X, 7);
         assert_eq!(again, Err(MeshFault::DuplicateFace { face: [2, 3, 1] }));
     }
 
     #[test]
     fn normals_point_to_the_open_side() {
-        let metric = Metric::new(2);
-        let n = metric.normal([IVec3::ZERO, IVec3::X, IVec3::Z]);
+        let n = unit_normal([IVec3::ZERO, IVec3::X, IVec3::Z], DVec3::new(2.0, 3.0, 5.0));
         assert_eq!(n, DVec3::new(0.0, -1.0, 0.0));
     }
 }

@@ -31,8 +31,6 @@ pub struct SequenceHeader {
     pub subpixel_bits: u8,
     /// The level of subdivision that colours and positions were fitted for, 0 to 2.
     pub subdivision_levels: u8,
-    /// Quantisation step of colours, in 1/16 of an 8-bit level.
-    pub color_step: u8,
 }
 
 /// Bytes that a coded header may have; bounds what the decoder of the header may allocate.
@@ -43,9 +41,6 @@ pub(super) const MAX_EXTENT: i32 = 1 << 19;
 
 /// Largest number of binary digits after the point.
 const MAX_SUBPIXEL_BITS: u8 = 6;
-
-/// Largest colour step: 8 levels.
-const MAX_COLOR_STEP: u8 = 128;
 
 impl SequenceHeader {
     /// The header's bytes: bincode's standard configuration (little-endian, integers of variable length).
@@ -87,7 +82,6 @@ impl SequenceHeader {
         let extent = u64::from(self.width.max(self.height)) << self.subpixel_bits;
         check_field("size in lattice units", extent, 1..=MAX_EXTENT as u64)?;
         check_field("subdivision levels", self.subdivision_levels.into(), 0..=2)?;
-        check_field("color step", self.color_step.into(), 1..=MAX_COLOR_STEP.into())?;
         check_field("frame rate denominator", self.frame_rate.denominator.into(), 1..=u64::MAX)?;
         check_field("pixel aspect ratio numerator", self.pixel_aspect_ratio.numerator.into(), 1..=u64::MAX)?;
         check_field("pixel aspect ratio denominator", self.pixel_aspect_ratio.denominator.into(), 1..=u64::MAX)
@@ -100,7 +94,11 @@ impl SequenceHeader {
 }
 
 /// A [`ParseError::Field`] unless `found` lies in `range`.
-fn check_field(field: &'static str, found: u64, range: std::ops::RangeInclusive<u64>) -> Result<(), ParseError> {
+pub(super) fn check_field(
+    field: &'static str,
+    found: u64,
+    range: std::ops::RangeInclusive<u64>,
+) -> Result<(), ParseError> {
     if range.contains(&found) {
         return Ok(());
     }
@@ -124,14 +122,13 @@ mod tests {
             pixel_aspect_ratio: Fraction { numerator: 1, denominator: 1 },
             subpixel_bits: 3,
             subdivision_levels: 1,
-            color_step: 16,
         }
     }
 
     #[test]
     fn bytes_are_those_of_the_format() {
         let bytes = header().to_bytes();
-        assert_eq!(bytes, [251, 0x80, 2, 251, 0x68, 1, 251, 0x30, 0x75, 251, 0xe9, 3, 1, 1, 3, 1, 16]);
+        assert_eq!(bytes, [251, 0x80, 2, 251, 0x68, 1, 251, 0x30, 0x75, 251, 0xe9, 3, 1, 1, 3, 1]);
         assert_eq!(SequenceHeader::from_bytes(&bytes, &Limits::default()), Ok(header()));
     }
 
@@ -163,7 +160,6 @@ mod tests {
         assert_eq!(name(|h| h.subpixel_bits = 7), "subpixel bits");
         assert_eq!(name(|h| (h.width, h.subpixel_bits) = (16_000, 6)), "size in lattice units");
         assert_eq!(name(|h| h.subdivision_levels = 3), "subdivision levels");
-        assert_eq!(name(|h| h.color_step = 0), "color step");
         assert_eq!(name(|h| h.frame_rate.denominator = 0), "frame rate denominator");
         assert_eq!(name(|h| h.pixel_aspect_ratio.numerator = 0), "pixel aspect ratio numerator");
     }

@@ -3,9 +3,11 @@
 //! In: a slab's committed mesh (write), bytes (parse). Out: packets, meshes. Forbidden here: pixels, files, clocks,
 //! threads, and any panic, unbounded allocation or endless loop that bytes could cause.
 
+mod bits;
 mod colors;
 mod connectivity;
 mod error;
+mod extents;
 mod framing;
 mod front;
 mod header;
@@ -13,6 +15,7 @@ mod hops;
 mod index;
 mod labels;
 mod limits;
+mod near;
 mod parser;
 mod positions;
 mod range_coder;
@@ -23,6 +26,8 @@ mod symbols;
 #[cfg(feature = "encode")]
 mod writer;
 
+pub use bits::{BitCounts, Part};
+pub use colors::COLOR_STEPS;
 #[cfg(feature = "encode")]
 pub use colors::quantize_color;
 #[cfg(feature = "encode")]

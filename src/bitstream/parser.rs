@@ -5,13 +5,14 @@
 
 use glam::IVec3;
 
-use super::colors::Steps;
+use super::bits::Tally;
+use super::colors::{COLOR_STEPS, Steps};
 use super::connectivity::Apex;
 use super::framing::{PacketHeader, parse_packet, read_u16, read_u32};
-use super::front::MAX_TIME_SHIFT;
+use super::header::check_field;
 use super::range_coder::{BitCoder, BitModel, RangeDecoder};
 use super::slab::{Side, Slab, SlabParams};
-use super::{Limits, MeshFault, ParseError, SequenceHeader};
+use super::{BitCounts, Limits, MeshFault, ParseError, Part, SequenceHeader};
 use crate::mesh::{Domain, TetMesh, VertexId};
 
 /// Parses the packets of a stream, one slab at a time.
@@ -19,6 +20,8 @@ use crate::mesh::{Domain, TetMesh, VertexId};
 pub struct SlabParser {
     limits: Limits,
     state: State,
+    /// Bits so far, if they are counted.
+    bits: Option<BitCounts>,
 }
 
 #[derive(Debug)]
@@ -54,7 +57,17 @@ const DURATION_BYTES: usize = 4;
 impl SlabParser {
     /// A parser that waits for a keyframe.
     pub fn new(limits: Limits) -> Self {
-        Self { limits, state: State::Empty }
+        Self { limits, state: State::Empty, bits: None }
+    }
+
+    /// Counts from now on where the bits of undamaged packets go; parsing takes a little longer.
+    pub fn count_bits(&mut self) {
+        self.bits.get_or_insert_default();
+    }
+
+    /// Bits of the packets parsed since [`Self::count_bits`].
+    pub fn bits(&self) -> BitCounts {
+        self.bits.unwrap_or_default()
     }
 
     /// Parses one whole packet. A keyframe starts a new slab; an index changes nothing.
@@ -63,9 +76,14 @@ impl SlabParser {
     /// Damage, a missing packet, or more than the limits allow. From then on packets are refused with
     /// [`ParseError::NoKeyframe`] until a keyframe; [`Self::mesh`] keeps what was complete.
     pub fn parse_packet(&mut self, packet: &[u8]) -> Result<PacketHeader, ParseError> {
+        let before = self.bits;
         let result = self.parse(packet);
         if result.is_err() {
             self.abandon();
+            self.bits = before;
+        } else if let (Some(before), Some(counts)) = (before, &mut self.bits) {
+            let coded = counts.total() - before.total();
+            counts.add(Part::Framing, 8.0 * packet.len() as f64 - coded);
         }
         result
     }
@@ -74,7 +92,7 @@ impl SlabParser {
         let (header, body) = parse_packet(packet, &self.limits)?;
         if header.keyframe {
             let (mut open, body) = OpenSlab::from_keyframe(&header, body, self.limits)?;
-            open.parse_payload(&header, body, &self.limits)?;
+            open.parse_payload(&header, body, &self.limits, self.bits.as_mut())?;
             self.state = State::Open(Box::new(open));
         } else if header.picture {
             let State::Open(open) = &mut self.state else { return Err(ParseError::NoKeyframe) };
@@ -85,7 +103,7 @@ impl SlabParser {
             if header.frame_number != expected {
                 return Err(ParseError::FrameNumber { expected, found: header.frame_number });
             }
-            open.parse_payload(&header, body, &self.limits)?;
+            open.parse_payload(&header, body, &self.limits, self.bits.as_mut())?;
         }
         Ok(header)
     }
@@ -120,6 +138,14 @@ impl SlabParser {
         }
     }
 
+    /// Quantisation step of the current slab's colours, in 1/16 of an 8-bit level; unknown after damage.
+    pub fn color_step(&self) -> Option<u8> {
+        match &self.state {
+            State::Open(open) => Some(open.slab.color_step()),
+            State::Empty | State::Broken(_) => None,
+        }
+    }
+
     /// Number of the current slab's first frame, counted from the start of the stream.
     pub fn first_frame(&self) -> Option<u64> {
         match &self.state {
@@ -144,6 +170,11 @@ impl SlabParser {
         matches!(&self.state, State::Open(open) if open.ended)
     }
 
+    /// Whether the slab's duration is known: from the first tet at its end, or from its last packet.
+    pub fn is_duration_known(&self) -> bool {
+        matches!(&self.state, State::Open(open) if open.slab.is_duration_known())
+    }
+
     /// Forgets everything and waits for a keyframe.
     pub fn flush(&mut self) {
         self.state = State::Empty;
@@ -162,16 +193,10 @@ impl OpenSlab {
             return Err(length(2));
         }
         let header_end = 2 + usize::from(read_u16(body, 0));
-        let Some(&time_shift) = body.get(header_end) else { return Err(length(header_end + 1)) };
+        let Some(&color_step) = body.get(header_end) else { return Err(length(header_end + 1)) };
         let header = SequenceHeader::from_bytes(&body[2..header_end], &limits)?;
-        let time_shift = time_shift as i8;
-        if time_shift.unsigned_abs() > MAX_TIME_SHIFT {
-            return Err(ParseError::Field {
-                field: "time shift",
-                expected: format!("-{MAX_TIME_SHIFT} to {MAX_TIME_SHIFT}"),
-                found: time_shift.to_string(),
-            });
-        }
+        let steps = u64::from(*COLOR_STEPS.start())..=u64::from(*COLOR_STEPS.end());
+        check_field("color step", color_step.into(), steps)?;
         let slab = Slab::new(SlabParams {
             domain: Domain {
                 width: header.width,
@@ -180,8 +205,7 @@ impl OpenSlab {
                 subpixel_bits: header.subpixel_bits,
             },
             max_duration: header.max_duration(&limits),
-            color_step: header.color_step,
-            time_shift,
+            color_step,
             limits,
         });
         let open = Self { header, first_frame: packet.frame_number, packets: 0, ended: false, slab };
@@ -189,7 +213,13 @@ impl OpenSlab {
     }
 
     /// Parses the part of the body that every packet of a slab has.
-    fn parse_payload(&mut self, packet: &PacketHeader, body: &[u8], limits: &Limits) -> Result<(), ParseError> {
+    fn parse_payload(
+        &mut self,
+        packet: &PacketHeader,
+        body: &[u8],
+        limits: &Limits,
+        counts: Option<&mut BitCounts>,
+    ) -> Result<(), ParseError> {
         let mut payload = body;
         if packet.last {
             let Some((duration, rest)) = body.split_at_checked(DURATION_BYTES) else {
@@ -203,8 +233,9 @@ impl OpenSlab {
             let limit = self.header.max_duration(limits).into();
             return Err(ParseError::TooLarge { field: "frames in a slab", limit, found: u64::from(self.packets) + 1 });
         }
-        let mut side = Parsing { decoder: RangeDecoder::new(payload) };
+        let mut side = Parsing { decoder: RangeDecoder::new(payload), tally: counts.map(Tally::new) };
         self.slab.code_packet(&mut side, if packet.last { u32::MAX } else { self.packets + 1 })?;
+        side.enter(Part::Connectivity);
         let unread = side.decoder.unread();
         if unread > 0 {
             let (expected, found) = (payload.len() - unread, payload.len());
@@ -220,6 +251,7 @@ impl OpenSlab {
 /// The parser's side of the syntax: decisions come from bytes, and nothing is known beforehand.
 struct Parsing<'a> {
     decoder: RangeDecoder<'a>,
+    tally: Option<Tally<'a>>,
 }
 
 impl BitCoder for Parsing<'_> {
@@ -230,6 +262,12 @@ impl BitCoder for Parsing<'_> {
 
     fn raw(&mut self, count: u32, value: u32) -> u32 {
         self.decoder.raw(count, value)
+    }
+
+    fn enter(&mut self, part: Part) {
+        if let Some(tally) = &mut self.tally {
+            tally.enter(part, self.decoder.position());
+        }
     }
 }
 
@@ -246,8 +284,8 @@ impl Side for Parsing<'_> {
         None
     }
 
-    fn new_vertex(&self) -> (IVec3, bool) {
-        (IVec3::ZERO, false)
+    fn new_vertex(&self) -> Option<(IVec3, bool)> {
+        None
     }
 
     fn vertex_coded(&mut self, _: VertexId) {}
@@ -256,7 +294,9 @@ impl Side for Parsing<'_> {
         0
     }
 
-    fn color(&self, _: VertexId) -> Steps {
+    fn wedge_made(&mut self, _: VertexId) {}
+
+    fn color(&self, _: usize) -> Steps {
         [0; 3]
     }
 

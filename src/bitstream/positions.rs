@@ -1,36 +1,52 @@
 //! Positions of new vertices.
 //!
-//! In: a position, predicted by the gate that it lies behind. Out: the same, coded. Forbidden here: which tets use it.
+//! In: a position, and the gate that it lies behind. Out: the same, coded. Forbidden here: which tets use it.
 
 use glam::IVec3;
 
 use super::MeshFault;
+use super::bits::Part;
+use super::extents::PARTS;
+use super::front::unit_normal;
 use super::header::MAX_EXTENT;
 use super::range_coder::{BitCoder, BitModel};
-use super::symbols::{IntModel, TreeModel};
+use super::symbols::{IntModel, UintModel};
 use crate::mesh::Domain;
 
-/// Classes of a gate's extent along an axis: its binary logarithm in lattice units, which is below 2^19.
-const SCALES: usize = 20;
-/// How near the prediction is to a side: beyond it, within the gate's extent, farther.
+/// Classes of a length: the binary logarithm of its square, which is below 2^38.
+const SCALES: usize = 40;
+/// How near the prediction is to a side: beyond it, within an extent, farther.
 const NEARNESS: usize = 3;
+/// Classes of how far behind the gate's plane the vertex is expected, in quarters of an extent.
+const HEIGHTS: usize = 5;
 
-/// Models of one axis of one kind of coordinate.
+/// How far ahead of the gate's centre a vertex is expected, in extents along the normal.
+const AHEAD: f64 = 0.625;
+/// Weights, in sixteenths, of the vertices across the gate's edges, relative to the gate's centre.
+const ACROSS: [i32; 3] = [4, 2, 1];
+/// The same of the gate's first and second corner and of the fourth corner of the tet before it.
+const FIRST: i32 = -3;
+/// See [`FIRST`].
+const SECOND: i32 = 6;
+/// See [`FIRST`].
+const OPPOSITE: i32 = -1;
+
+/// Models of one axis.
 #[derive(Debug, Clone)]
 struct AxisModels {
     /// Whether the vertex lies on the low and on the high side, by number of gate corners there and nearness.
     on_side: [[[BitModel; NEARNESS]; 4]; 2],
-    /// Whole pixels or frames from the prediction, by scale.
-    whole: [IntModel; SCALES],
-    /// Digits after the point, by whole part: -1, 0, other.
-    fraction: [TreeModel; 3],
+    /// Residual of one of the first two coordinates, by scale.
+    free: [IntModel; SCALES],
+    /// Distance beyond the gate's plane, by scale and expectation.
+    height: [[UintModel; HEIGHTS]; SCALES],
 }
 
 impl AxisModels {
     const NEW: Self = Self {
         on_side: [[[BitModel::NEW; NEARNESS]; 4]; 2],
-        whole: [const { IntModel::NEW }; SCALES],
-        fraction: [const { TreeModel::NEW }; 3],
+        free: [const { IntModel::NEW }; SCALES],
+        height: [const { [const { UintModel::NEW }; HEIGHTS] }; SCALES],
     };
 }
 
@@ -46,6 +62,7 @@ impl PositionModels {
 
     /// Codes whether subdivision must leave the new vertex where it is.
     pub(super) fn code_pinned(&mut self, coder: &mut impl BitCoder, truth: bool) -> bool {
+        coder.enter(Part::Space);
         coder.bit(&mut self.pinned, truth)
     }
 }
@@ -53,10 +70,14 @@ impl PositionModels {
 /// What a new vertex's position is predicted from.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Behind {
-    /// Positions of the gate's corners.
+    /// Positions of the gate's corners, the focus first.
     pub(super) gate: [IVec3; 3],
     /// Position of the fourth corner of the tet before the gate.
     pub(super) opposite: IVec3,
+    /// Positions of the vertices across the gate's edges.
+    pub(super) across: [Option<IVec3>; 3],
+    /// Sum of the extents at the gate's corners, in 1/16 lattice units.
+    pub(super) extent: IVec3,
 }
 
 /// The part of space that is known of.
@@ -74,13 +95,83 @@ impl Bounds {
         let extent = self.domain.extent();
         if self.top_known { extent } else { IVec3::new(extent.x, extent.y, MAX_EXTENT) }
     }
+
+    /// The high side along an axis; the end of the slab is one only once it is known.
+    fn high_side(&self, axis: usize) -> Option<i32> {
+        (axis < 2 || self.top_known).then_some(self.far()[axis])
+    }
+}
+
+/// Where a vertex is expected behind a gate, and the gate's plane.
+struct Expectation {
+    /// Mean extent of edges around the gate, in lattice units.
+    extent: [f64; 3],
+    /// The gate's unit normal, measured in extents.
+    normal: [f64; 3],
+    predicted: [i32; 3],
+    /// The gate's normal in lattice units, exact.
+    plane: [i64; 3],
+    /// A point of the plane.
+    origin: IVec3,
+    /// The axis along which the plane is steepest: its coordinate comes last.
+    last: usize,
+}
+
+impl Expectation {
+    fn new(behind: &Behind) -> Self {
+        let [a, b, c] = behind.gate;
+        let (u, v) = ((b - a).as_i64vec3(), (c - a).as_i64vec3());
+        let extent = behind.extent.as_dvec3() / f64::from(3 * PARTS);
+        let normal = unit_normal(behind.gate, extent);
+        let sum = a + b + c;
+        let mut ahead = 3 * (SECOND * b + FIRST * a + OPPOSITE * behind.opposite) - (SECOND + FIRST + OPPOSITE) * sum;
+        for (weight, across) in ACROSS.into_iter().zip(behind.across) {
+            ahead += across.map_or(IVec3::ZERO, |p| weight * (3 * p - sum));
+        }
+        let (extent, normal) = (extent.to_array(), normal.to_array());
+        let predicted = [0, 1, 2].map(|axis| {
+            let center = f64::from(sum[axis]) / 3.0 + f64::from(ahead[axis]) / 48.0;
+            (center + AHEAD * extent[axis] * normal[axis] + 0.5).floor() as i32
+        });
+        // The first of equals.
+        let steeper = |best: usize, axis: usize| if normal[axis].abs() > normal[best].abs() { axis } else { best };
+        let last = steeper(steeper(0, 1), 2);
+        Self { extent, normal, predicted, plane: u.cross(v).to_array(), origin: a, last }
+    }
+
+    /// Coordinates in the order in which they are coded.
+    fn order(&self) -> [usize; 3] {
+        match self.last {
+            0 => [1, 2, 0],
+            1 => [0, 2, 1],
+            _ => [0, 1, 2],
+        }
+    }
+
+    /// The first coordinate along the last axis that lies behind the gate's plane, given the others, and the direction.
+    fn nearest(&self, position: IVec3) -> (i64, i64) {
+        let d = (position - self.origin).as_i64vec3();
+        let rest: i64 = (0..3).filter(|&axis| axis != self.last).map(|axis| self.plane[axis] * d[axis]).sum();
+        let (slope, origin) = (self.plane[self.last], i64::from(self.origin[self.last]));
+        // slope * (coordinate - origin) > -rest
+        if slope > 0 {
+            (origin + (-rest).div_euclid(slope) + 1, 1)
+        } else {
+            (origin - (-rest).div_euclid((-slope).max(1)) - 1, -1)
+        }
+    }
+}
+
+/// Class of a length in lattice units.
+fn scale_class(length: f64) -> usize {
+    (((length * length).max(1.0) as u64).ilog2() as usize).min(SCALES - 1)
 }
 
 /// Predicts and codes the position of the new vertex behind a gate.
 ///
-/// The prediction carries on from the opposite corner through the gate's centre by an eighth of their distance (three
-/// quarters cost 0.7 bits a vertex more). It is affine, so the scale of time against space does not matter. Rounded to whole pixels and frames, it leaves the
-/// digits after the point to a model of their own, which costs nothing where vertices sit on the pixel lattice.
+/// The prediction lies ahead of the gate, drawn towards the open faces around it; the weights are a least squares fit
+/// over the vertices of CUP and BUNNY360. The vertex must lie behind the gate's plane, so the coordinate along the axis
+/// that is nearest to the gate's normal comes last, as a distance from the plane.
 ///
 /// # Errors
 /// A position outside the box.
@@ -91,64 +182,71 @@ pub(super) fn code_position(
     bounds: &Bounds,
     truth: IVec3,
 ) -> Result<IVec3, MeshFault> {
-    let bits = u32::from(bounds.domain.subpixel_bits);
+    let expectation = Expectation::new(behind);
     let far = bounds.far();
-    let sum: IVec3 = behind.gate.into_iter().sum();
     let mut position = IVec3::ZERO;
-    for (axis, models) in models.axes.iter_mut().enumerate() {
-        let gate = behind.gate.map(|p| p[axis]);
-        let all = [gate[0], gate[1], gate[2], behind.opposite[axis]];
-        let scale = all.iter().fold(0, |e, &c| e.max((c - all[0]).unsigned_abs())).max(1);
-        let predicted = (3 * i64::from(sum[axis]) - i64::from(behind.opposite[axis])).div_euclid(8) as i32;
-        // The end of the slab is a side only once it is known.
-        let high = (axis < 2 || bounds.top_known).then_some(far[axis]);
-        let mut on_side = None;
-        for (side, place) in [Some(0), high].into_iter().enumerate() {
-            let Some(place) = place else { continue };
-            let beyond = if side == 0 { predicted } else { place - predicted };
-            let nearness = if beyond <= 0 { 0 } else { 1 + usize::from(beyond.unsigned_abs() > scale) };
-            let corners = gate.iter().filter(|&&c| c == place).count();
-            if coder.bit(&mut models.on_side[side][corners][nearness], truth[axis] == place) {
-                on_side = Some(place);
-                break;
-            }
+    for axis in expectation.order() {
+        coder.enter(if axis < 2 { Part::Space } else { Part::Time });
+        let models = &mut models.axes[axis];
+        if let Some(place) = code_side(coder, models, behind, &expectation, (axis, bounds.high_side(axis)), truth[axis])
+        {
+            position[axis] = place;
+            continue;
         }
-        position[axis] = match on_side {
-            Some(place) => place,
-            None => {
-                let class = (scale.ilog2() as usize).min(SCALES - 1);
-                let rounded = (predicted.clamp(0, far[axis]) + ((1 << bits) >> 1)) >> bits;
-                code_coordinate(coder, models, class, rounded, bits, truth[axis])?
-            }
+        let coordinate = if axis == expectation.last {
+            let nearest = expectation.nearest(position);
+            code_height(coder, models, &expectation, nearest, truth[axis])
+        } else {
+            let model = &mut models.free[scale_class(expectation.extent[axis])];
+            let predicted = expectation.predicted[axis];
+            i64::from(predicted) + i64::from(model.code(coder, truth[axis].wrapping_sub(predicted)))
         };
+        if !(0..=i64::from(far[axis])).contains(&coordinate) {
+            return Err(MeshFault::Range { field: "coordinate", low: 0, high: far[axis].into(), found: coordinate });
+        }
+        position[axis] = coordinate as i32;
     }
     Ok(position)
 }
 
-/// Codes one coordinate as whole part and digits after the point, from a prediction in whole pixels or frames.
-fn code_coordinate(
+/// Codes whether a coordinate is that of a side of the box, and of which.
+fn code_side(
     coder: &mut impl BitCoder,
     models: &mut AxisModels,
-    scale_class: usize,
-    predicted: i32,
-    bits: u32,
+    behind: &Behind,
+    expectation: &Expectation,
+    (axis, high): (usize, Option<i32>),
     truth: i32,
-) -> Result<i32, MeshFault> {
-    let residual = truth - (predicted << bits);
-    let whole = models.whole[scale_class].code(coder, residual >> bits);
-    let context = match whole {
-        -1 => 0,
-        0 => 1,
-        _ => 2,
-    };
-    let fraction = models.fraction[context].code(coder, bits, residual as u32 & ((1 << bits) - 1));
-    let coordinate = ((i64::from(predicted) + i64::from(whole)) << bits) + i64::from(fraction);
-    i32::try_from(coordinate).map_err(|_| MeshFault::Range {
-        field: "coordinate",
-        low: i32::MIN.into(),
-        high: i32::MAX.into(),
-        found: coordinate,
-    })
+) -> Option<i32> {
+    let predicted = expectation.predicted[axis];
+    for (side, place) in [Some(0), high].into_iter().enumerate() {
+        let Some(place) = place else { continue };
+        let beyond = if side == 0 { i64::from(predicted) } else { i64::from(place) - i64::from(predicted) };
+        let is_far = beyond as f64 > expectation.extent[axis];
+        let nearness = if beyond <= 0 { 0 } else { 1 + usize::from(is_far) };
+        let corners = behind.gate.iter().filter(|p| p[axis] == place).count();
+        if coder.bit(&mut models.on_side[side][corners][nearness], truth == place) {
+            return Some(place);
+        }
+    }
+    None
+}
+
+/// Codes the coordinate along the last axis: how far it is from the first one behind the gate's plane.
+fn code_height(
+    coder: &mut impl BitCoder,
+    models: &mut AxisModels,
+    expectation: &Expectation,
+    (nearest, direction): (i64, i64),
+    truth: i32,
+) -> i64 {
+    let axis = expectation.last;
+    let scale = expectation.extent[axis] / expectation.normal[axis].abs();
+    let expected = (i64::from(expectation.predicted[axis]) - nearest) * direction;
+    let class = (expected as f64 / scale * 4.0).clamp(0.0, (HEIGHTS - 1) as f64) as usize;
+    let height = ((i64::from(truth) - nearest) * direction).clamp(0, MAX_EXTENT.into()) as u32;
+    let height = models.height[scale_class(scale)][class].code(coder, height);
+    nearest + direction * i64::from(height)
 }
 
 /// Codes a position as plain numbers, for the corners of a seed.

@@ -7,42 +7,50 @@
 //! binary and adapts at once, which needs no division and no cumulative table, and a packet of few bytes pays for one
 //! or two bytes of flushing instead of a 32-bit word or two.
 
+use super::bits::Part;
+
 /// The probability that a decision is 1, learnt from the decisions coded before in the same context.
 ///
-/// The mean of a fast and a slow exponential average (both start with the plain mean of the first decisions), so that
-/// a new context learns within a few symbols and an old one is precise.
+/// The mean of the decisions so far, then an exponential average of the last ones.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BitModel {
-    fast: u16,
-    slow: u16,
-    seen: u8,
+    /// P(1) in 2^-22.
+    average: u32,
+    /// Decisions so far, at most [`SEEN_MAX`].
+    seen: u32,
 }
 
-/// Window of the fast average, as a power of two.
-const FAST_SHIFT: u32 = 4;
-/// Window of the slow average, as a power of two.
-const SLOW_SHIFT: u32 = 7;
-/// Decisions after which the slow average has reached its window.
-const SEEN_MAX: u8 = (1 << SLOW_SHIFT) - 2;
+/// Binary digits of an average.
+const AVERAGE_BITS: u32 = 22;
+/// Decisions after which a model no longer learns more slowly.
+const SEEN_MAX: u32 = 255;
+
+/// What part of the way to the next decision the average of n decisions moves, in 1/65536: 1 / (n + 1.5).
+const RATES: [u32; SEEN_MAX as usize + 1] = {
+    let mut rates = [0; SEEN_MAX as usize + 1];
+    let mut n = 0;
+    while n < rates.len() {
+        rates[n] = (2 << 16) / (2 * n as u32 + 3);
+        n += 1;
+    }
+    rates
+};
 
 impl BitModel {
     /// A model that expects nothing.
-    pub(super) const NEW: Self = Self { fast: 1 << 15, slow: 1 << 15, seen: 0 };
+    pub(super) const NEW: Self = Self { average: 1 << (AVERAGE_BITS - 1), seen: 0 };
 
-    /// P(1) in 1/65536. Averages stop moving a window short of 0 and 1, so it stays away from both by 32 or more.
+    /// P(1) in 1/65536, kept away from 0 and 1.
     fn probability(self) -> u32 {
-        (u32::from(self.fast) + u32::from(self.slow)) >> 1
+        (self.average >> (AVERAGE_BITS - 16)).clamp(32, 65_504)
     }
 
     fn update(&mut self, bit: bool) {
-        let shift = (u32::from(self.seen) + 2).ilog2();
-        for (average, limit) in [(&mut self.fast, FAST_SHIFT), (&mut self.slow, SLOW_SHIFT)] {
-            let shift = shift.min(limit);
-            if bit {
-                *average += (u16::MAX - *average) >> shift;
-            } else {
-                *average -= *average >> shift;
-            }
+        let rate = u64::from(RATES[self.seen as usize]);
+        if bit {
+            self.average += ((u64::from((1 << AVERAGE_BITS) - self.average) * rate) >> 16) as u32;
+        } else {
+            self.average -= ((u64::from(self.average) * rate) >> 16) as u32;
         }
         self.seen = (self.seen + 1).min(SEEN_MAX);
     }
@@ -59,6 +67,9 @@ pub(super) trait BitCoder {
 
     /// Codes the low `count` (at most 32) bits of `value`, each as likely 0 as 1, the highest first.
     fn raw(&mut self, count: u32, value: u32) -> u32;
+
+    /// What is coded from here on belongs to this part of the mesh.
+    fn enter(&mut self, _: Part) {}
 }
 
 /// Codes decisions to bytes.
@@ -188,6 +199,11 @@ impl<'a> RangeDecoder<'a> {
     /// Whether more has been read than any encoder wrote.
     pub(super) fn is_exhausted(&self) -> bool {
         self.next > self.bytes.len() + Self::FREE_BYTES as usize
+    }
+
+    /// Information of the decisions read so far, in bits.
+    pub(super) fn position(&self) -> f64 {
+        8.0 * self.next as f64 - f64::from(self.range).log2()
     }
 
     /// Bytes at the end that were not read.

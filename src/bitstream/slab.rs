@@ -10,9 +10,11 @@ mod wedges;
 
 use glam::IVec3;
 
-use super::colors::{ColorModels, Steps};
-use super::connectivity::{Apex, ConnectivityModels, Gate, choose_gate, code_apex, code_vertex_id};
-use super::front::{Front, Metric};
+use super::bits::Part;
+use super::colors::{ColorModels, Misses, Steps};
+use super::connectivity::{Apex, ConnectivityModels, Fan, Gate, choose_gate, code_apex, code_vertex_id};
+use super::extents::{Extents, PARTS};
+use super::front::{Front, unit_normal};
 use super::hops::{Hops, RINGS};
 use super::labels::LabelModels;
 use super::positions::{Behind, Bounds, PositionModels, code_free_position, code_position};
@@ -32,14 +34,16 @@ pub(super) trait Side: BitCoder {
     fn behind(&mut self, tet: u32, corners: [VertexId; 3]) -> Apex;
     /// Corner number `corner` of the current tet, a seed, if it is coded; else it will be the next new vertex.
     fn seed_corner(&mut self, corner: usize) -> Option<VertexId>;
-    /// Position of the next new vertex, and whether it is pinned.
-    fn new_vertex(&self) -> (IVec3, bool);
+    /// Position of the next new vertex, and whether it is pinned, if that is known.
+    fn new_vertex(&self) -> Option<(IVec3, bool)>;
     /// The next new vertex has this id.
     fn vertex_coded(&mut self, id: VertexId);
     /// Label of the current tet; `count`, the number of labels so far, for a new one.
     fn label(&mut self, count: u32) -> u32;
-    /// Colour of the current tet at the coded vertex `vertex`.
-    fn color(&self, vertex: VertexId) -> Steps;
+    /// The current tet has a new wedge at the coded vertex `vertex`.
+    fn wedge_made(&mut self, vertex: VertexId);
+    /// Colour of a coded wedge.
+    fn color(&self, wedge: usize) -> Steps;
     /// The current tet is complete and has the next number.
     fn tet_coded(&mut self);
     /// Whether the payload still holds what was read.
@@ -69,12 +73,15 @@ pub(super) struct Slab {
     mesh: TetMesh,
     /// Colours of `mesh.wedges` in steps.
     steps: Vec<Steps>,
+    /// How far off their predictions were.
+    misses: Vec<Misses>,
     color_step: u8,
     bounds: Bounds,
     /// Longest duration allowed, in frames.
     max_duration: u32,
     limits: Limits,
     front: Front,
+    fan: Fan,
     hops: Hops,
     models: Box<Models>,
     /// Last wedge of each label.
@@ -82,15 +89,23 @@ pub(super) struct Slab {
     /// Per vertex its youngest wedge, per wedge the next older one of its vertex.
     wedge_head: Vec<u32>,
     wedge_next: Vec<u32>,
-    /// Per vertex the youngest (tet, corner) as 4 tet + corner, and per such slot the next older one.
+    /// Per vertex the youngest (tet, corner) as 4 tet + corner.
     star_head: Vec<u32>,
-    star_next: Vec<[u32; 4]>,
-    /// Vertices of each tet: the mesh has them only by way of its wedges.
-    corners: Vec<[VertexId; 4]>,
+    extents: Extents,
+    linked: Vec<LinkedTet>,
     /// Per vertex the hop that its neighbours have been told, and its youngest slot then.
     passed_on: Vec<(u8, u32)>,
     /// Lengths of the mesh's arrays, and its duration, when the last packet was complete.
     complete: Complete,
+}
+
+/// A tet in the lists of its vertices' stars.
+#[derive(Debug, Clone, Copy)]
+struct LinkedTet {
+    /// Its vertices: the mesh has them only by way of its wedges.
+    corners: [VertexId; 4],
+    /// Per corner the next older slot of the vertex there.
+    older: [u32; 4],
 }
 
 /// How much of a mesh is complete.
@@ -111,8 +126,6 @@ pub(super) struct SlabParams {
     pub(super) max_duration: u32,
     /// Quantisation step of colours, in 1/16 of a level.
     pub(super) color_step: u8,
-    /// Scale of time in the metric of angles.
-    pub(super) time_shift: i8,
     /// Bounds on counts.
     pub(super) limits: Limits,
 }
@@ -123,11 +136,13 @@ impl Slab {
         Self {
             mesh: TetMesh::empty(domain),
             steps: Vec::new(),
+            misses: Vec::new(),
             color_step: params.color_step,
             bounds: Bounds { domain, top_known: false },
             max_duration: params.max_duration,
             limits: params.limits,
-            front: Front::new(Metric::new(params.time_shift)),
+            front: Front::new(),
+            fan: Fan::NEW,
             hops: Hops::new(),
             models: Box::new(Models {
                 connectivity: ConnectivityModels::NEW,
@@ -141,16 +156,26 @@ impl Slab {
             wedge_head: Vec::new(),
             wedge_next: Vec::new(),
             star_head: Vec::new(),
-            star_next: Vec::new(),
-            corners: Vec::new(),
+            extents: Extents::default(),
+            linked: Vec::new(),
             passed_on: Vec::new(),
             complete: Complete { duration: 1, ..Complete::default() },
         }
     }
 
+    /// Quantisation step of colours, in 1/16 of a level.
+    pub(super) fn color_step(&self) -> u8 {
+        self.color_step
+    }
+
     /// What is coded so far.
     pub(super) fn mesh(&self) -> &TetMesh {
         &self.mesh
+    }
+
+    /// Whether the mesh's duration is final.
+    pub(super) fn is_duration_known(&self) -> bool {
+        self.bounds.top_known
     }
 
     /// The mesh as it was after the last packet that was coded without an error.
@@ -182,13 +207,15 @@ impl Slab {
         self.hops.begin_packet(low_frames);
         loop {
             while let Some((vertex, hop)) = self.hops.next() {
-                while let Some(gate) = choose_gate(&self.front, &self.mesh, vertex) {
+                while let Some(gate) = self.choose_gate(vertex) {
                     self.close_gate(side, &gate)?;
                 }
                 self.pass_hop_on(vertex, hop);
             }
+            side.enter(Part::Connectivity);
             let seed = side.seed();
             if !side.bit(&mut self.models.seed, seed) {
+                self.code_colors(side)?;
                 return side.check();
             }
             self.code_seed(side)?;
@@ -223,6 +250,10 @@ impl Slab {
         Ok(())
     }
 
+    fn choose_gate(&mut self, focus: VertexId) -> Option<Gate> {
+        choose_gate(&mut self.fan, (&self.front, &self.mesh), &self.extents, focus)
+    }
+
     /// The neighbours of `vertex`, whose star is complete, are one edge farther. Tets that were there the last time
     /// are passed over, so that all visits together are linear in the star.
     fn pass_hop_on(&mut self, vertex: VertexId, hop: u8) {
@@ -234,11 +265,11 @@ impl Slab {
         let until = if told == hop { until } else { NONE };
         let mut slot = youngest;
         while slot != until {
-            let (tet, corner) = (slot as usize / 4, slot as usize % 4);
-            for neighbour in self.corners[tet] {
+            let tet = &self.linked[slot as usize / 4];
+            for neighbour in tet.corners {
                 self.hops.lower(neighbour, hop + 1);
             }
-            slot = self.star_next[tet][corner];
+            slot = tet.older[slot as usize % 4];
         }
     }
 
@@ -255,7 +286,7 @@ impl Slab {
         let around = (&self.front, &self.mesh);
         let apex = match code_apex(side, &mut self.models.connectivity, around, gate, truth)? {
             Apex::Known(vertex) => vertex,
-            Apex::New => self.code_apex_vertex(side, before, gate.corners)?,
+            Apex::New => self.code_apex_vertex(side, before, gate)?,
             nothing @ (Apex::Hole | Apex::Top) => {
                 if nothing == Apex::Top {
                     self.end_at_face(gate.corners)?;
@@ -291,20 +322,31 @@ impl Slab {
     }
 
     /// Codes the new vertex behind a gate.
-    fn code_apex_vertex(
-        &mut self,
-        side: &mut impl Side,
-        before: u32,
-        gate: [VertexId; 3],
-    ) -> Result<VertexId, MeshFault> {
-        let corners = self.corners[before as usize];
-        let opposite = corners.into_iter().find(|v| !gate.contains(v)).unwrap_or(corners[0]);
+    fn code_apex_vertex(&mut self, side: &mut impl Side, before: u32, gate: &Gate) -> Result<VertexId, MeshFault> {
+        let corners = self.linked[before as usize].corners;
+        let opposite = corners.into_iter().find(|v| !gate.corners.contains(v)).unwrap_or(corners[0]);
         let at = |v: VertexId| self.mesh.positions[v.index()];
-        let behind = Behind { gate: gate.map(at), opposite: at(opposite) };
-        let (truth, pinned) = side.new_vertex();
-        self.check_inside(truth)?;
-        let position = code_position(side, &mut self.models.positions, &behind, &self.bounds, truth)?;
+        let behind = Behind {
+            gate: gate.corners.map(at),
+            opposite: at(opposite),
+            across: gate.across.map(|vertex| vertex.map(at)),
+            extent: gate.extent,
+        };
+        let truth = side.new_vertex();
+        if let Some((position, _)) = truth {
+            self.check_inside(position)?;
+            let [a, b, c] = behind.gate;
+            self.check_positive(volume6(a, b, c, position))?;
+        }
+        let (position, pinned) = truth.unwrap_or_default();
+        let position = code_position(side, &mut self.models.positions, &behind, &self.bounds, position)?;
         self.push_vertex(side, position, pinned)
+    }
+
+    /// Whether six times the volume of the next tet is one that a tet may have.
+    fn check_positive(&self, volume6: i64) -> Result<(), MeshFault> {
+        let tet = self.mesh.tets.len() as u32;
+        if volume6 > 0 { Ok(()) } else { Err(MeshFault::NotPositive { tet, volume6 }) }
     }
 
     /// Codes the pin of the next vertex, and appends it.
@@ -322,6 +364,7 @@ impl Slab {
         self.front.push_vertex();
         self.wedge_head.push(NONE);
         self.star_head.push(NONE);
+        self.extents.push_vertex();
         self.passed_on.push((u8::MAX, NONE));
         let frame = (position.z >> self.bounds.domain.subpixel_bits) as u32;
         self.hops.push_vertex(frame);
@@ -349,8 +392,9 @@ impl Slab {
             *slot = if side.bit(&mut self.models.seed_known, truth.is_some()) {
                 code_vertex_id(side, truth.unwrap_or(VertexId(0)), self.mesh.positions.len() as u32)?
             } else {
-                let (position, pinned) = side.new_vertex();
+                let (position, pinned) = side.new_vertex().unwrap_or_default();
                 self.check_inside(position)?;
+                side.enter(Part::Space);
                 let position = code_free_position(side, &self.bounds, position);
                 self.push_vertex(side, position, pinned)?
             };
@@ -367,28 +411,33 @@ impl Slab {
             return Err(MeshFault::TooMany { field: "tets", limit: self.limits.max_tets });
         }
         let positions = corners.map(|v| self.mesh.positions[v.index()]);
-        let volume6 = volume6(positions[0], positions[1], positions[2], positions[3]);
-        if volume6 <= 0 {
-            return Err(MeshFault::NotPositive { tet, volume6 });
-        }
-        let facing = FACES.map(|face| {
-            // The gate is face 3, opposite the apex.
-            if face == FACES[3] && gate.is_some() { gate } else { self.front.facing(face.map(|c| corners[c])) }
+        self.check_positive(volume6(positions[0], positions[1], positions[2], positions[3]))?;
+        let is_new = gate.is_some() && self.star_head[corners[3].index()] == NONE;
+        let facing = [0, 1, 2, 3].map(|face| match gate {
+            // The gate is face 3, opposite the apex; a new apex has no other open face.
+            Some(_) if face == 3 => gate,
+            Some(_) if is_new => None,
+            _ => self.front.facing(FACES[face].map(|c| corners[c])),
         });
+        side.enter(Part::Labels);
         let label = self.code_tet_label(side, corners, gate, facing)?;
         let wedges = self.code_wedges(side, corners, label)?;
         self.mesh.tets.push(wedges);
-        self.corners.push(corners);
-        self.star_next.push([0, 1, 2, 3].map(|corner| {
+        let older = [0, 1, 2, 3].map(|corner| {
             let head = &mut self.star_head[corners[corner].index()];
             std::mem::replace(head, tet * 4 + corner as u32)
-        }));
+        });
+        self.linked.push(LinkedTet { corners, older });
+        self.extents.learn(corners, positions);
         for (face, closed) in FACES.into_iter().zip(facing) {
             let corners = face.map(|c| corners[c]);
             match closed {
                 Some(closed) => self.front.remove(closed),
                 None if self.is_walled(corners) => {}
-                None => self.front.insert(corners, face.map(|c| positions[c]), tet)?,
+                None => {
+                    let scale = self.extents.around(corners).as_dvec3() / f64::from(3 * PARTS);
+                    self.front.insert(corners, unit_normal(face.map(|c| positions[c]), scale), tet)?;
+                }
             }
         }
         side.tet_coded();

@@ -12,7 +12,7 @@ use super::connectivity::Apex;
 use super::range_coder::{BitCoder, BitModel, RangeEncoder};
 use super::slab::Side;
 use super::{MeshFault, WriteError};
-use crate::mesh::{FACES, FaceMap, MeshError, TetMesh, VertexId};
+use crate::mesh::{FACES, FaceMap, MeshError, TetMesh, VertexId, WedgeId};
 use crate::video::Label;
 
 /// No tet, or no vertex.
@@ -34,6 +34,7 @@ pub(super) struct Source {
     /// Source ids of the stream's vertices and tets.
     source_vertex: Vec<VertexId>,
     source_tet: Vec<u32>,
+    source_wedge: Vec<WedgeId>,
     /// Stream numbers of labels.
     labels: BTreeMap<Label, u32>,
 }
@@ -48,6 +49,7 @@ impl Source {
             coded_vertex: Vec::new(),
             source_vertex: Vec::new(),
             source_tet: Vec::new(),
+            source_wedge: Vec::new(),
             labels: BTreeMap::new(),
         }
     }
@@ -206,8 +208,8 @@ impl Side for Writing<'_> {
         self.coded(self.vertex)
     }
 
-    fn new_vertex(&self) -> (IVec3, bool) {
-        (self.mesh.positions[self.vertex.index()], self.mesh.pinned[self.vertex.index()])
+    fn new_vertex(&self) -> Option<(IVec3, bool)> {
+        Some((self.mesh.positions[self.vertex.index()], self.mesh.pinned[self.vertex.index()]))
     }
 
     fn vertex_coded(&mut self, id: VertexId) {
@@ -219,10 +221,15 @@ impl Side for Writing<'_> {
         *self.source.labels.entry(self.mesh.tet_label(self.tet)).or_insert(count)
     }
 
-    fn color(&self, vertex: VertexId) -> Steps {
+    fn wedge_made(&mut self, vertex: VertexId) {
         let vertex = self.source.source_vertex[vertex.index()];
         let wedges = self.mesh.tets[self.tet];
         let wedge = wedges.into_iter().find(|&w| self.mesh.vertex(w) == vertex).unwrap_or(wedges[0]);
+        self.source.source_wedge.push(wedge);
+    }
+
+    fn color(&self, wedge: usize) -> Steps {
+        let wedge = self.source.source_wedge[wedge];
         to_steps(self.mesh.wedges[wedge.index()].color, self.color_step)
     }
 

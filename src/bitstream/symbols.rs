@@ -65,24 +65,6 @@ impl IntModel {
     }
 }
 
-/// Model of a number of at most 6 bits, every value with a probability of its own: a binary tree.
-#[derive(Debug, Clone)]
-pub(super) struct TreeModel([BitModel; 64]);
-
-impl TreeModel {
-    pub(super) const NEW: Self = Self([BitModel::NEW; 64]);
-
-    /// Codes the low `count` bits of `value`, the highest first.
-    pub(super) fn code(&mut self, coder: &mut impl BitCoder, count: u32, value: u32) -> u32 {
-        let mut number = 1;
-        for place in (0..count).rev() {
-            let bit = coder.bit(&mut self.0[number as usize], value >> place & 1 == 1);
-            number = number << 1 | u32::from(bit);
-        }
-        number - (1 << count)
-    }
-}
-
 #[cfg(all(test, feature = "encode"))]
 mod tests {
     use super::super::range_coder::{RangeDecoder, RangeEncoder};
@@ -93,21 +75,19 @@ mod tests {
         let values: Vec<i32> =
             (0..31).flat_map(|e| [(1 << e) - 1, 1 << e, (1 << e) + 1]).filter(|&v: &i32| v < i32::MAX - 1).collect();
         let mut encoder = RangeEncoder::new();
-        let (mut uint, mut int, mut tree) = (UintModel::NEW, IntModel::NEW, TreeModel::NEW);
+        let (mut uint, mut int) = (UintModel::NEW, IntModel::NEW);
         for &v in &values {
             uint.code(&mut encoder, v as u32);
             int.code(&mut encoder, -v);
             int.code(&mut encoder, v);
-            tree.code(&mut encoder, 6, v as u32 & 63);
         }
         let bytes = encoder.finish();
         let mut decoder = RangeDecoder::new(&bytes);
-        let (mut uint, mut int, mut tree) = (UintModel::NEW, IntModel::NEW, TreeModel::NEW);
+        let (mut uint, mut int) = (UintModel::NEW, IntModel::NEW);
         for &v in &values {
             assert_eq!(uint.code(&mut decoder, 0), v as u32);
             assert_eq!(int.code(&mut decoder, 0), -v);
             assert_eq!(int.code(&mut decoder, 0), v);
-            assert_eq!(tree.code(&mut decoder, 6, 0), v as u32 & 63);
         }
         assert!(!decoder.is_exhausted());
     }

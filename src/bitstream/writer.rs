@@ -3,8 +3,8 @@
 //! In: the slab's committed mesh, once a packet. Out: packets, one a frame. Forbidden here: choosing keyframes, or
 //! changing the mesh.
 
+use super::colors::{COLOR_STEPS, DEFAULT_COLOR_STEP};
 use super::framing::{PacketHeader, write_packet};
-use super::front::MAX_TIME_SHIFT;
 use super::slab::{Slab, SlabParams};
 use super::source::{Source, Writing};
 use super::{Limits, Packet, SequenceHeader, WriteError};
@@ -15,6 +15,7 @@ use crate::mesh::{Domain, TetMesh};
 pub struct SlabWriter {
     header: SequenceHeader,
     first_frame: u64,
+    color_step: u8,
     packets: u32,
     ended: bool,
     source: Source,
@@ -29,7 +30,27 @@ impl SlabWriter {
     /// A header that no parser would accept.
     pub fn try_new(header: SequenceHeader, first_frame: u64) -> Result<Self, WriteError> {
         header.check(&Limits::default()).map_err(WriteError::Header)?;
-        Ok(Self { header, first_frame, packets: 0, ended: false, source: Source::new(), slab: None })
+        Ok(Self {
+            header,
+            first_frame,
+            color_step: DEFAULT_COLOR_STEP,
+            packets: 0,
+            ended: false,
+            source: Source::new(),
+            slab: None,
+        })
+    }
+
+    /// Quantises the slab's colours in steps of so many sixteenths of a level; without, in steps of two levels.
+    ///
+    /// # Errors
+    /// A step out of [`COLOR_STEPS`], or one that comes after the first packet.
+    pub fn set_color_step(&mut self, color_step: u8) -> Result<(), WriteError> {
+        if self.slab.is_some() || !COLOR_STEPS.contains(&color_step) {
+            return Err(WriteError::ColorStep { found: color_step });
+        }
+        self.color_step = color_step;
+        Ok(())
     }
 
     /// Writes the packet of the slab's next frame k (0, 1, ...), after which [k, k + 1) can be rendered.
@@ -48,20 +69,18 @@ impl SlabWriter {
         self.check_domain(mesh)?;
         self.source.update(mesh)?;
         let mut body = Vec::new();
-        let time_shift = if self.slab.is_none() { Some(time_shift(mesh)) } else { None };
-        if let Some(time_shift) = time_shift {
+        if self.slab.is_none() {
             let header = self.header.to_bytes();
             body.extend_from_slice(&(header.len() as u16).to_le_bytes());
             body.extend_from_slice(&header);
-            body.push(time_shift as u8);
+            body.push(self.color_step);
         }
         let header = self.header;
         let slab = self.slab.get_or_insert_with(|| {
             Slab::new(SlabParams {
                 domain: mesh.domain,
                 max_duration: header.max_duration(&Limits::default()),
-                color_step: header.color_step,
-                time_shift: time_shift.unwrap_or(0),
+                color_step: self.color_step,
                 limits: Limits::default(),
             })
         });
@@ -73,7 +92,7 @@ impl SlabWriter {
         } else {
             (self.packets + 1, (self.packets as i32 + 1).saturating_mul(mesh.domain.unit()))
         };
-        let mut side = Writing::new(&mut self.source, mesh, self.header.color_step, low_until);
+        let mut side = Writing::new(&mut self.source, mesh, self.color_step, low_until);
         slab.code_packet(&mut side, low_frames)?;
         body.extend_from_slice(&side.finish());
         self.source.sweep();
@@ -109,27 +128,4 @@ impl SlabWriter {
         let expected = Domain { width, height, subpixel_bits, ..mesh.domain };
         if mesh.domain == expected { Ok(()) } else { Err(WriteError::Domain { expected, found: mesh.domain }) }
     }
-}
-
-/// The power of two by which time should be stretched for edges of the mesh to be as long in t as in x and y.
-fn time_shift(mesh: &TetMesh) -> i8 {
-    let (mut space, mut time) = (0u64, 0u64);
-    for tet in 0..mesh.tets.len() {
-        let [a, rest @ ..] = mesh.tet_positions(tet);
-        for b in rest {
-            let d = (b - a).abs();
-            space += u64::from(d.x.unsigned_abs()) + u64::from(d.y.unsigned_abs());
-            time += u64::from(d.z.unsigned_abs());
-        }
-    }
-    // Space has two axes; the nearest power of two, so compare at sqrt(1/2), about 181/256.
-    let (space, time) = ((space / 2).max(1), time.max(1));
-    let mut shift = 0i8;
-    while shift < MAX_TIME_SHIFT as i8 && time << shift < space * 181 / 256 {
-        shift += 1;
-    }
-    while shift > -(MAX_TIME_SHIFT as i8) && time * 181 / 256 > space << -shift.min(0) {
-        shift -= 1;
-    }
-    shift
 }

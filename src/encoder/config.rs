@@ -56,6 +56,9 @@ pub struct EncoderConfig {
     pub simplification_ratio: f64,
     /// Mean absolute error per channel to simplify up to, in 8-bit levels; 0: off, the ratio decides.
     pub target_error: f64,
+    /// Kilobits (1000 bits) a second of the stream, reached by a ratio of its own for each slab; 0: off, the ratio decides.
+    /// At 25 frames a second where there is no fixed rate. Not together with `target_error`.
+    pub bitrate: u32,
     /// Length T of the sliding window in frames (§VI), [`Self::WINDOW`]; from `key_int_max` on a slab is simplified as a
     /// whole, which reaches the lowest error.
     pub window: u32,
@@ -89,6 +92,8 @@ impl EncoderConfig {
     pub const SIMPLIFICATION_RATIO: std::ops::RangeInclusive<f64> = 0.0005..=1.0;
     /// Range of `target_error`.
     pub const TARGET_ERROR: std::ops::RangeInclusive<f64> = 0.0..=255.0;
+    /// Range of `bitrate`.
+    pub const BITRATE: std::ops::RangeInclusive<u32> = 0..=10_000_000;
     /// Range of `window`.
     pub const WINDOW: std::ops::RangeInclusive<u32> = 4..=600;
     /// Range of `key_int_max`.
@@ -113,6 +118,7 @@ impl EncoderConfig {
             pixel_aspect_ratio: Fraction { numerator: 1, denominator: 1 },
             simplification_ratio: 0.01,
             target_error: 0.0,
+            bitrate: 0,
             window: 60,
             key_int_max: 60,
             superpixels: 1,
@@ -179,6 +185,8 @@ impl EncoderConfig {
         if !Self::TARGET_ERROR.contains(&self.target_error) {
             return Err(setting("target_error", &Self::TARGET_ERROR, self.target_error));
         }
+        let bitrates = if self.target_error > 0.0 { 0..=0 } else { Self::BITRATE };
+        in_range("bitrate", self.bitrate, bitrates)?;
         if !Self::LATTICE_DENSITY.contains(&self.lattice_density) {
             return Err(setting("lattice_density", &Self::LATTICE_DENSITY, self.lattice_density));
         }
@@ -248,7 +256,6 @@ impl EncoderConfig {
             pixel_aspect_ratio: self.pixel_aspect_ratio,
             subpixel_bits: SUBPIXEL_BITS,
             subdivision_levels: self.subdivision_levels,
-            color_step: COLOR_STEP,
         }
     }
 }
@@ -259,8 +266,6 @@ const TETS_A_VERTEX: f64 = 7.0;
 const STEERED_RATIO: f64 = 0.02;
 /// Positions are rounded to 1/8 px and 1/8 frame: costs 0.1 dB (docs/benchmarks.md).
 const SUBPIXEL_BITS: u8 = 3;
-/// Colours are rounded to 2 levels, in sixteenths of a level.
-const COLOR_STEP: u8 = 32;
 
 fn setting<T: std::fmt::Debug>(
     field: &'static str,
@@ -298,6 +303,7 @@ mod tests {
         assert_eq!(field(EncoderConfig::new(0, 240)), "width x height");
         assert_eq!(field(EncoderConfig { simplification_ratio: f64::NAN, ..good.clone() }), "simplification_ratio");
         assert_eq!(field(EncoderConfig { target_error: -1.0, ..good.clone() }), "target_error");
+        assert_eq!(field(EncoderConfig { target_error: 1.0, bitrate: 100, ..good.clone() }), "bitrate");
         assert_eq!(field(EncoderConfig { lattice_density: 0.5, ..good.clone() }), "lattice_density");
         assert_eq!(field(EncoderConfig { position_steps: 101, ..good.clone() }), "position_steps");
         assert_eq!(field(EncoderConfig { refits: 9, ..good.clone() }), "refits");

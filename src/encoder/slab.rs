@@ -6,10 +6,12 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::observer::{Event, Observer, Stage};
+use super::proof::Proof;
+use super::quantize::{color_step, rounded_rms};
 use super::readiness::{FAR, hops};
 use super::runs::{Run, Runs};
 use super::{EncodeError, EncoderConfig, ErrorMetric};
-use crate::bitstream::{Packet, RINGS, SlabWriter};
+use crate::bitstream::{Packet, RINGS, SlabWriter, quantize_color};
 use crate::mesh::{Domain, StarTable, TetMesh};
 use crate::vectorize::fit::{FitParams, FitReport, FitRequest, fit};
 use crate::vectorize::lattice::AdaptiveLattice;
@@ -46,10 +48,6 @@ pub(super) const ERROR_GAIN: f64 = 150.0;
 /// Most vertices that are fitted at once.
 const FIT_VERTICES: usize = 300_000;
 
-/// Mean absolute error over root mean square error, about that of a Laplacian's residuals: 0.55 to 0.61 on natural
-/// clips.
-const ABSOLUTE_OVER_RMS: f64 = 0.58;
-
 /// How a slab ends.
 #[derive(Debug)]
 pub(super) enum SlabEnd {
@@ -67,6 +65,8 @@ pub(super) struct FinishedSlab {
     pub(super) vertices: u64,
     /// What was learnt about [`ERROR_GAIN`].
     pub(super) error_gain: f64,
+    /// Mean absolute error, where the error decides.
+    pub(super) error: Option<f64>,
 }
 
 /// A slab's encoder, whatever its error metric.
@@ -97,6 +97,7 @@ pub(super) struct SlabEncoder<Q> {
     ratio: f64,
     target_error: f64,
     error_gain: f64,
+    proof: Proof,
     /// Frames behind the window's leading plane that are kept after a step.
     kept: u32,
     /// Packets that are fitted and written together, to look at each frame less often.
@@ -110,6 +111,8 @@ pub(super) struct SlabEncoder<Q> {
     work: WorkMesh<Q>,
     committed: TetMesh,
     writer: SlabWriter,
+    /// Step of colours in sixteenths of a level, once it is chosen.
+    color_step: Option<u8>,
     runs: Runs,
     /// Frames that the fit may still need, and their labels.
     volume: Volume,
@@ -135,6 +138,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             ratio: config.simplification_ratio,
             target_error: config.target_error,
             error_gain,
+            proof: Proof::new(config),
             kept: config.kept_frames(),
             batch: config.window,
             refits: config.refits,
@@ -151,13 +155,15 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             },
             fit_params: FitParams {
                 subdivision_levels: config.subdivision_levels,
-                color_step: header.color_step,
+                // As good as none: how coarse colours may be follows from the error that they leave.
+                color_step: 1,
                 position_iterations: config.position_steps,
                 ..FitParams::default()
             },
             work: WorkMesh::new(domain),
             committed: TetMesh::empty(domain),
             writer: SlabWriter::try_new(header, first_frame)?,
+            color_step: None,
             runs: Runs::new(domain, config),
             volume: Volume::new(0),
             labels: VecDeque::new(),
@@ -314,6 +320,9 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             packets.push(self.writer.write_packet(&self.committed, Some(k + 1) == frames)?);
         }
         observer.tell(Event::Ended);
+        if self.is_steered() {
+            self.follow_error(end)?;
+        }
         self.sent = end;
         self.forget_frames(&stars);
         Ok(packets)
@@ -331,12 +340,37 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     fn fit(&mut self, stars: &StarTable) -> Result<FitReport, EncodeError> {
         let free = self.unsent(stars);
         let source = Source { frames: &self.volume, labels: self.labels.make_contiguous() };
-        let total = fit_in_parts(&mut self.committed, &free, source, &self.fit_params)?;
-        let reached = ABSOLUTE_OVER_RMS * total.rms_after;
-        if self.is_steered() && reached > 0.0 {
+        let mut total = fit_in_parts(&mut self.committed, &free, source, &self.fit_params)?;
+        self.quantize_colors(&mut total)?;
+        Ok(total)
+    }
+
+    /// Learns from the packets before frame `end`, which have just been written, what their error has come to.
+    fn follow_error(&mut self, end: u32) -> Result<(), EncodeError> {
+        let Some(mesh) = self.writer.coded_mesh() else { return Ok(()) };
+        let written = self.sent..end;
+        let frames = self.volume.frames().filter(|(number, _)| written.contains(number));
+        if let Some(reached) = self.proof.compare(mesh, frames)?.filter(|&reached| reached > 0.0) {
             self.error_gain *= (self.target_error / reached).powi(2).clamp(0.5, 2.0);
         }
-        Ok(total)
+        Ok(())
+    }
+
+    /// Rounds colours as the stream will; the slab's first fit decides how coarsely.
+    fn quantize_colors(&mut self, report: &mut FitReport) -> Result<(), EncodeError> {
+        let step = match self.color_step {
+            Some(step) => step,
+            None => {
+                let step = color_step(report.rms_after);
+                self.writer.set_color_step(step)?;
+                *self.color_step.insert(step)
+            }
+        };
+        for wedge in &mut self.committed.wedges {
+            wedge.color = quantize_color(wedge.color, step);
+        }
+        report.rms_after = rounded_rms(report.rms_after, step);
+        Ok(())
     }
 
     /// Lets go of frames that no tet with an unsent vertex, nor any tet to come, reaches.
@@ -391,7 +425,7 @@ impl<Q: WedgeQuadric> WindowEncoder for SlabEncoder<Q> {
         self.committed.domain.duration = duration;
         let packets = self.advance(Some(frames), observer)?;
         let vertices = self.committed.positions.len() as u64;
-        Ok(FinishedSlab { packets, vertices, error_gain: self.error_gain })
+        Ok(FinishedSlab { packets, vertices, error_gain: self.error_gain, error: self.proof.error() })
     }
 }
 

@@ -239,3 +239,17 @@ fn an_observer_hears_of_every_stage() {
     assert!(heard.iter().any(|event| matches!(event, Event::Simplified(report) if report.collapses > 0)));
     assert!(heard.iter().any(|event| matches!(event, Event::Fitted(report) if report.pixels > 0)));
 }
+
+/// Ten seconds at 25 frames a second, in slabs of a second.
+#[test]
+fn the_bit_rate_is_kept_over_ten_seconds() {
+    let size = (64, 48);
+    let frames = disc(size, 0, 250);
+    for kilobits in [60, 150] {
+        let config = EncoderConfig { bitrate: kilobits, key_int_max: 25, position_steps: 2, ..config(size) };
+        let stream = encode(&frames, config, &[]);
+        let reached = stream.bytes().len() as f64 * 8.0 / 10.0 / 1000.0;
+        let off = reached / f64::from(kilobits) - 1.0;
+        assert!(off.abs() <= 0.05, "{kilobits} kbit/s asked for, {reached:.1} reached");
+    }
+}

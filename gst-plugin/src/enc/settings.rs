@@ -115,6 +115,15 @@ impl Settings {
                 default.window,
             ),
             uint(
+                (
+                    "bitrate",
+                    "Bit rate",
+                    "Kilobits a second, by a ratio for each slab (0 = off: the simplification ratio decides)",
+                ),
+                EncoderConfig::BITRATE,
+                default.bitrate,
+            ),
+            uint(
                 ("key-int-max", "Maximum keyframe interval", "Most frames from one keyframe to the next"),
                 EncoderConfig::KEY_INT_MAX,
                 default.key_int_max,
@@ -190,6 +199,7 @@ impl Settings {
             "speed-preset" => *preset = value.get().expect("a preset"),
             "simplification-ratio" => goals.simplification_ratio = double(),
             "target-error" => goals.target_error = double(),
+            "bitrate" => goals.bitrate = uint(),
             "key-int-max" => goals.key_int_max = uint(),
             "threads" => goals.threads = usize::try_from(uint()).unwrap_or(0),
             "window" => own.window = Some(uint()),
@@ -212,6 +222,7 @@ impl Settings {
             "speed-preset" => self.preset.to_value(),
             "simplification-ratio" => config.simplification_ratio.to_value(),
             "target-error" => config.target_error.to_value(),
+            "bitrate" => config.bitrate.to_value(),
             "key-int-max" => config.key_int_max.to_value(),
             "threads" => u32::try_from(config.threads).unwrap_or(0).to_value(),
             "window" => config.window.to_value(),

@@ -106,7 +106,6 @@ mod tests {
             pixel_aspect_ratio: Fraction { numerator: 1, denominator: 1 },
             subpixel_bits: 3,
             subdivision_levels: 1,
-            color_step: 16,
         }
     }
 

@@ -3,7 +3,9 @@
 //! In: a tet's corners. Out: its label and wedges, coded where they are new. Forbidden here: moving the front.
 
 use crate::bitstream::MeshFault;
-use crate::bitstream::colors::{Around, Steps, code_color, from_steps};
+use glam::Vec3;
+
+use crate::bitstream::colors::{Around, code_color, from_steps};
 use crate::bitstream::labels::{LabelContext, code_label};
 use crate::mesh::{VertexId, Wedge, WedgeId};
 use crate::video::Label;
@@ -15,6 +17,9 @@ const MAX_WEDGES_A_VERTEX: usize = 1 << 8;
 
 /// Wedges of a corner that are looked at to find candidates for a label.
 const LABEL_SCAN: usize = 8;
+
+/// Tets around a vertex that are looked at to predict a colour.
+const STAR_SCAN: usize = 256;
 
 impl Slab {
     /// Codes the label of the tet with these corners; `facing` are the open faces that it will close.
@@ -90,46 +95,60 @@ impl Slab {
                 return Err(MeshFault::TooMany { field: "labels at a vertex", limit: MAX_WEDGES_A_VERTEX as u32 });
             }
         }
-        for corner in 0..4 {
-            if wedges[corner].is_some() {
-                continue;
+        for (slot, vertex) in wedges.iter_mut().zip(corners) {
+            if slot.is_none() {
+                *slot = Some(self.push_wedge(vertex, label)?);
+                side.wedge_made(vertex);
             }
-            let vertex = corners[corner];
-            let around = self.around(&wedges, vertex, label);
-            let truth = side.color(vertex);
-            let steps = code_color(side, &mut self.models.colors, &around, self.color_step, truth)?;
-            wedges[corner] = Some(self.push_wedge(vertex, label, steps)?);
         }
         Ok(wedges.map(|w| WedgeId(w.unwrap_or(0) as u32)))
     }
 
-    /// What the colour of a new wedge is predicted from.
-    fn around(&self, wedges: &[Option<usize>; 4], vertex: VertexId, label: u32) -> Around {
-        let of_label = || self.last_wedge.get(label as usize).map(|&w| Around::Label(self.steps[w as usize]));
-        let of_vertex = || self.wedges_at(vertex).next().map_or([0; 3], |w| self.steps[w]);
-        let at = |v: VertexId| self.mesh.positions[v.index()];
-        // By inverse square distance in the metric of the front.
-        let weight = |w: usize| {
-            let d = self.front.metric().vector(at(vertex), at(self.mesh.wedges[w].vertex));
-            1.0 / (d.x * d.x + d.y * d.y + d.z * d.z)
-        };
-        Around::of_tet(wedges.iter().flatten().map(|&w| (self.steps[w], weight(w))))
-            .or_else(of_label)
-            .unwrap_or_else(|| Around::Other(of_vertex()))
-    }
-
-    fn push_wedge(&mut self, vertex: VertexId, label: u32, steps: Steps) -> Result<usize, MeshFault> {
+    fn push_wedge(&mut self, vertex: VertexId, label: u32) -> Result<usize, MeshFault> {
         if self.mesh.wedges.len() >= self.limits.max_wedges as usize {
             return Err(MeshFault::TooMany { field: "wedges", limit: self.limits.max_wedges });
         }
-        let color = from_steps(steps, self.color_step);
-        let wedge = self.mesh.push_wedge(Wedge { vertex, label: Label(label), color });
-        self.steps.push(steps);
+        let wedge = self.mesh.push_wedge(Wedge { vertex, label: Label(label), color: Vec3::ZERO });
         self.wedge_next.push(std::mem::replace(&mut self.wedge_head[vertex.index()], wedge.0));
         match self.last_wedge.get_mut(label as usize) {
             Some(last) => *last = wedge.0,
             None => self.last_wedge.push(wedge.0),
         }
         Ok(wedge.index())
+    }
+
+    /// Codes the colours of all wedges that have none yet.
+    pub(super) fn code_colors(&mut self, side: &mut impl Side) -> Result<(), MeshFault> {
+        for wedge in self.steps.len()..self.mesh.wedges.len() {
+            side.check()?;
+            let around = self.around(wedge);
+            let truth = side.color(wedge);
+            let (steps, misses) = code_color(side, &mut self.models.colors, &around, self.color_step, truth)?;
+            self.mesh.wedges[wedge].color = from_steps(steps, self.color_step);
+            self.steps.push(steps);
+            self.misses.push(misses);
+        }
+        Ok(())
+    }
+
+    /// What the colour of the next wedge is predicted from.
+    fn around(&self, wedge: usize) -> Around {
+        let mut around = Around::default();
+        let Wedge { vertex, .. } = self.mesh.wedges[wedge];
+        let mut slot = self.star_head[vertex.index()];
+        for _ in 0..STAR_SCAN {
+            let Some(linked) = self.linked.get(slot as usize / 4) else { break };
+            let corners = self.mesh.tets[slot as usize / 4];
+            if corners[slot as usize % 4].index() == wedge {
+                for other in corners.into_iter().filter(|w| w.index() < wedge) {
+                    around.add(self.steps[other.index()], self.misses[other.index()]);
+                }
+            }
+            slot = linked.older[slot as usize % 4];
+        }
+        if around.is_empty() && wedge > 0 {
+            around.add(self.steps[wedge - 1], [0; 2]);
+        }
+        around
     }
 }

@@ -41,8 +41,6 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     ) -> Result<(), EncodeError> {
         let params = FitParams {
             position_iterations: self.fit_params.position_iterations.min(STEPS),
-            // Nothing of this is sent.
-            color_step: 1,
             ..self.fit_params.clone()
         };
         let mut fitted: Option<TetMesh> = None;
