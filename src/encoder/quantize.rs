@@ -1,8 +1,11 @@
 //! Steps of colours: as coarse as the slab's own error allows.
 //!
 //! In: the error that fitted colours leave. Out: a step, and what it adds to the error. Forbidden here: pictures.
+//!
+//! The error meant is what most of the picture has, not what edges of a drawing have: in its flat parts nothing hides the
+//! steps.
 
-/// Colour step over the root mean square error. Errors of rounding are independent, and a picture interpolates between
+/// Colour step over the root mean square error within tets. Errors of rounding are independent, and a picture interpolates between
 /// the wedges of a tet, so a step s adds s^2 / 30 to the squared error: 0.12 dB at this ratio. By rate and distortion it
 /// could be coarser on BUNNY360 (1.3) and finer on CUP (docs/benchmarks.md).
 const STEP_OVER_RMS: f64 = 0.95;
@@ -13,7 +16,7 @@ const STEPS: std::ops::RangeInclusive<f64> = 32.0..=128.0;
 /// The part of a squared step that rounding adds to the squared error: 1/12 at a wedge, 2/5 of it inside of a tet.
 const NOISE: f64 = 1.0 / 30.0;
 
-/// The step, in sixteenths of a level, for a slab with this error in levels.
+/// The step, in sixteenths of a level, for a slab whose tets have this root mean square error, in levels.
 pub(super) fn color_step(rms: f64) -> u8 {
     // `max` gives the least step without an error to go by, too.
     (16.0 * STEP_OVER_RMS * rms).round().max(*STEPS.start()).min(*STEPS.end()) as u8

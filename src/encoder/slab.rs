@@ -361,7 +361,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let step = match self.color_step {
             Some(step) => step,
             None => {
-                let step = color_step(report.rms_after);
+                let step = color_step(report.rms_within_tets);
                 self.writer.set_color_step(step)?;
                 *self.color_step.insert(step)
             }

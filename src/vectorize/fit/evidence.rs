@@ -47,4 +47,15 @@ impl Evidence {
         });
         inside + self.edges.energy(model, &nodes)
     }
+    /// The root mean square error inside of a tet, a mean over all pixels that no boundary passes.
+    pub(super) fn error_within_tets(&self, model: &Model, wedge_colors: &[Vec3]) -> f64 {
+        let nodes = model.node_colors(wedge_colors);
+        let sum = parallel::sum(self.moments.len(), |m| {
+            let moments = &self.moments[m];
+            let tet = model.tets[moments.tet as usize];
+            (moments.energy(tet.map(|n| nodes[n as usize])) * f64::from(moments.pixels) / 3.0).sqrt()
+        });
+        let pixels: u64 = self.moments.iter().map(|m| u64::from(m.pixels)).sum();
+        sum / pixels.max(1) as f64
+    }
 }

@@ -166,6 +166,7 @@ impl<'a> Fitting<'a> {
         self.colors.optimize(&self.model, &evidence, self.params.color_iterations, self.params);
         self.colors.quantize(self.params.color_step);
         self.report.rms_after = self.rms(&evidence);
+        self.report.rms_within_tets = evidence.error_within_tets(&self.model, &self.colors.now);
     }
 
     fn finish(mut self, mesh: &mut TetMesh) -> FitReport {

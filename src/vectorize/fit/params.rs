@@ -162,6 +162,9 @@ pub struct FitReport {
     pub rms_positions: f64,
     /// Colour error at the end: folds pinned, colours quantised.
     pub rms_after: f64,
+    /// Colour error at the end within a tet, a mean over all pixels: far below `rms_after` where few places have most of
+    /// the error, as in drawings.
+    pub rms_within_tets: f64,
     /// Steps of the position optimisation that stood.
     pub position_steps: u32,
     /// Moves that were refused since a tet would have become flat or too thin.
@@ -187,6 +190,8 @@ impl FitReport {
             rms_colors: mean(|report| report.rms_colors),
             rms_positions: mean(|report| report.rms_positions),
             rms_after: mean(|report| report.rms_after),
+            rms_within_tets: (self.rms_within_tets * self.pixels as f64 + other.rms_within_tets * other.pixels as f64)
+                / pixels,
             position_steps: self.position_steps.max(other.position_steps),
             refused_moves: self.refused_moves + other.refused_moves,
             pins: PinReport {
