@@ -158,6 +158,8 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
                 // As good as none: how coarse colours may be follows from the error that they leave.
                 color_step: 1,
                 position_iterations: config.position_steps,
+                // Where only colours are fitted, nothing fits between the centres.
+                quarter_weight: if config.position_steps == 0 { 0.0 } else { FitParams::default().quarter_weight },
                 ..FitParams::default()
             },
             work: WorkMesh::new(domain),

@@ -41,6 +41,8 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     ) -> Result<(), EncodeError> {
         let params = FitParams {
             position_iterations: self.fit_params.position_iterations.min(STEPS),
+            // Edges are told from their neighbourhood in the end.
+            quarter_weight: 0.0,
             ..self.fit_params.clone()
         };
         let mut fitted: Option<TetMesh> = None;

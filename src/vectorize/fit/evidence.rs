@@ -21,13 +21,19 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// Looks at the frames, in the memory of what was seen before. `points` are the model's points, `colors` its nodes'
-    /// colours (only to choose references by).
-    pub(super) fn gather(self, model: &Model, points: &[IVec3], colors: &[Vec3], frames: &Volume) -> Self {
+    /// Looks at the frames, in the memory of what was seen before; a quarter of a pixel counts `quarter_weight`. `points`
+    /// are the model's points, `colors` its nodes' colours (only to choose references by).
+    pub(super) fn gather(
+        self,
+        model: &Model,
+        (points, colors): (&[IVec3], &[Vec3]),
+        frames: &Volume,
+        quarter_weight: f32,
+    ) -> Self {
         let planes = Planes::new(model, frames);
         let crossings = find_crossings(&model.interfaces, points, &planes);
         let marks = Marks::new(&crossings, model.domain.width, model.domain.height);
-        let view = View { planes, marks: &marks };
+        let view = View { planes, marks: &marks, quarter_weight };
         let moments = measure(model, points, colors, &view, self.moments);
         let pieces = find_pieces(model, points, &view);
         Self { moments, edges: EdgePixels::new(&marks, frames, pieces, &crossings) }
@@ -36,6 +42,11 @@ impl Evidence {
     /// Number of pixels that count.
     pub(super) fn pixels(&self) -> u64 {
         self.moments.iter().map(|m| u64::from(m.pixels)).sum::<u64>() + self.edges.counted()
+    }
+
+    /// What all counts, in pixels.
+    pub(super) fn weight(&self) -> f64 {
+        self.moments.iter().map(|m| f64::from(m.weight)).sum::<f64>() + self.edges.counted() as f64
     }
 
     /// The squared error over all pixels and channels, for wedges of these colours.
@@ -53,9 +64,9 @@ impl Evidence {
         let sum = parallel::sum(self.moments.len(), |m| {
             let moments = &self.moments[m];
             let tet = model.tets[moments.tet as usize];
-            (moments.energy(tet.map(|n| nodes[n as usize])) * f64::from(moments.pixels) / 3.0).sqrt()
+            (moments.energy(tet.map(|n| nodes[n as usize])) * f64::from(moments.weight) / 3.0).sqrt()
         });
-        let pixels: u64 = self.moments.iter().map(|m| u64::from(m.pixels)).sum();
-        sum / pixels.max(1) as f64
+        let weight: f64 = self.moments.iter().map(|m| f64::from(m.weight)).sum();
+        sum / weight.max(1.0)
     }
 }

@@ -25,6 +25,7 @@ mod patch;
 mod pin;
 mod planes;
 mod polygon;
+mod quarters;
 mod refine;
 mod sparse;
 mod surface;
@@ -182,11 +183,12 @@ impl<'a> Fitting<'a> {
 
     fn gather(&self) -> Evidence {
         let points = self.model.points(&self.patch.mesh.positions);
-        Evidence::default().gather(&self.model, &points, &self.model.node_colors(&self.colors.now), self.frames)
+        let colors = self.model.node_colors(&self.colors.now);
+        Evidence::default().gather(&self.model, (&points, &colors), self.frames, self.params.quarter_weight)
     }
 
     fn rms(&self, evidence: &Evidence) -> f64 {
-        let values = (3 * evidence.pixels()).max(1);
-        (evidence.squared_error(&self.model, &self.colors.now) / values as f64).sqrt()
+        let values = (3.0 * evidence.weight()).max(1.0);
+        (evidence.squared_error(&self.model, &self.colors.now) / values).sqrt()
     }
 }

@@ -3,7 +3,10 @@
 //! In: fine tets at their positions, and frames. Out: per tet sums from which the squared error, its gradient and its
 //! Gauss-Newton matrix follow for any colours, without another look at the pixels; and the parts of marked pixels.
 //! An unmarked pixel counts where its centre lies in a slice of the tet, in exactly one tet (half-open spans whose ends are
-//! computed from each edge in one direction); inverted tets count nothing, since they are drawn over.
+//! computed from each edge in one direction), and its quarters, a little, where theirs lie; inverted tets count nothing,
+//! since they are drawn over.
+
+use std::ops::Range;
 
 use glam::{DVec3, IVec3, Mat3, Vec3, Vec4};
 
@@ -13,6 +16,8 @@ use super::model::Model;
 use super::parallel;
 use super::planes::Planes;
 use super::polygon::{FLAT, Polygon, Weights};
+use super::quarters::quarter;
+use crate::video::Frame;
 
 /// Sums over the pixels of one fine tet. phi are the weights (barycentric coordinates) of a pixel's centre, and
 /// colours are taken relative to `reference`, so that sums of squares stay exact enough in f32.
@@ -20,8 +25,10 @@ use super::polygon::{FLAT, Polygon, Weights};
 pub(super) struct Moments {
     /// Number of the tet among the model's tets.
     pub(super) tet: u32,
-    /// Number of pixels; 0 where all sums are.
+    /// Number of pixels.
     pub(super) pixels: u32,
+    /// What they count, and their quarters; 0 where all sums are.
+    pub(super) weight: f32,
     /// The colour that sums are relative to.
     reference: Vec3,
     /// Sum of phi phi^T: 00, 11, 22, 33, 01, 02, 03, 12, 13, 23.
@@ -73,6 +80,8 @@ pub(super) struct View<'a> {
     pub(super) planes: Planes<'a>,
     /// Pixels that are taken whole and not at their centres.
     pub(super) marks: &'a Marks,
+    /// What a quarter of a pixel counts beside its centre.
+    pub(super) quarter_weight: f32,
 }
 
 /// The moments of all of the model's tets, in their order, over the pixels that are not marked. `points` are the model's
@@ -149,8 +158,41 @@ impl View<'_> {
                     marks.unmarked(y, from..to, |run| add(y, run.start, run.end));
                 }),
             }
+            if self.quarter_weight > 0.0 {
+                self.add_quarters(&mut sums, (k, frame), &polygon.enlarged(2.0), &weights, reference);
+            }
         }
         sums.finish(tet, reference)
+    }
+
+    /// Adds the quarters whose middles lie in a slice (in units of half a pixel), of pixels that are not marked: two of each
+    /// pixel, on the diagonal that its neighbours do not have.
+    fn add_quarters(
+        &self,
+        sums: &mut Sums,
+        (k, frame): (u32, &Frame),
+        polygon: &Polygon,
+        weights: &Weights,
+        reference: Vec3,
+    ) {
+        let (plane, along_x) = (self.planes.time(k), 0.5 * weights.along_x);
+        let mut add = |row: u32, columns: Range<u32>| {
+            let middle = |n: u32| 0.5 * (f64::from(n) + 0.5);
+            let first = weights.at(DVec3::new(middle(columns.start), middle(row), plane));
+            for x in columns.start / 2..columns.end.div_ceil(2) {
+                let column = 2 * x + ((row ^ x ^ (row / 2)) & 1);
+                if columns.contains(&column) {
+                    let phi = first + along_x * (column - columns.start) as f32;
+                    sums.add_one(phi, quarter(frame, column, row) - reference, self.quarter_weight);
+                }
+            }
+        };
+        polygon.spans(2 * frame.width(), 2 * frame.height(), |row, from, to| match self.marks.frame(k) {
+            None => add(row, from..to),
+            Some(marks) => marks.unmarked(row / 2, from / 2..to.div_ceil(2), |run| {
+                add(row, (2 * run.start).max(from)..(2 * run.end).min(to));
+            }),
+        });
     }
 
     /// Appends the parts of marked pixels that one tet covers.
@@ -182,6 +224,7 @@ impl View<'_> {
 #[derive(Default)]
 struct Sums {
     pixels: u32,
+    weight: f32,
     gram: [Vec4; 4],
     rhs: [Vec4; 3],
     square: f32,
@@ -192,23 +235,31 @@ impl Sums {
         for (i, &[r, g, b]) in row.iter().enumerate() {
             let phi = first + along_x * i as f32;
             let color = Vec3::new(f32::from(r), f32::from(g), f32::from(b)) - reference;
-            self.gram[0] += phi * phi.x;
-            self.gram[1] += phi * phi.y;
-            self.gram[2] += phi * phi.z;
-            self.gram[3] += phi * phi.w;
-            self.rhs[0] += phi * color.x;
-            self.rhs[1] += phi * color.y;
-            self.rhs[2] += phi * color.z;
-            self.square += color.length_squared();
+            self.add_one(phi, color, 1.0);
         }
         self.pixels += row.len() as u32;
     }
 
+    #[inline(always)]
+    fn add_one(&mut self, phi: Vec4, color: Vec3, weight: f32) {
+        let weighted = phi * weight;
+        self.gram[0] += weighted * phi.x;
+        self.gram[1] += weighted * phi.y;
+        self.gram[2] += weighted * phi.z;
+        self.gram[3] += weighted * phi.w;
+        self.rhs[0] += weighted * color.x;
+        self.rhs[1] += weighted * color.y;
+        self.rhs[2] += weighted * color.z;
+        self.square += weight * color.length_squared();
+        self.weight += weight;
+    }
+
     fn finish(self, tet: u32, reference: Vec3) -> Option<Moments> {
-        let Self { pixels, gram: g, rhs: [r, gr, b], square } = self;
-        (pixels > 0).then(|| Moments {
+        let Self { pixels, weight, gram: g, rhs: [r, gr, b], square } = self;
+        (weight > 0.0).then(|| Moments {
             tet,
             pixels,
+            weight,
             reference,
             gram: [g[0].x, g[1].y, g[2].z, g[3].w, g[0].y, g[0].z, g[0].w, g[1].z, g[1].w, g[2].w],
             rhs: std::array::from_fn(|i| Vec3::new(r[i], gr[i], b[i])),

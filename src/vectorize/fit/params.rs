@@ -33,6 +33,10 @@ pub struct FitParams {
     /// How many pixels a wedge's first colour is worth: what keeps wedges without pixels.
     pub color_anchor: f32,
 
+    /// What a quarter of a pixel counts beside the pixel's centre: what lies between centres is seen when the picture is
+    /// enlarged. 0: it does not count.
+    pub quarter_weight: f32,
+
     /// Steps of the position optimisation; 0: positions stay.
     pub position_iterations: u32,
     /// Steps of conjugate gradients within one. More go closer to the linearised optimum, where more vertices stand in
@@ -62,6 +66,7 @@ impl Default for FitParams {
             color_iterations: 30,
             color_steps_between: 3,
             color_anchor: 0.05,
+            quarter_weight: 0.1,
             position_iterations: 12,
             position_cg_iterations: 1,
             position_stiffness: 1.0,
@@ -79,6 +84,7 @@ impl FitParams {
         let not_negative = [
             ("laplacian_weight", self.laplacian_weight),
             ("surface_reach_px", self.surface_reach_px),
+            ("quarter_weight", self.quarter_weight),
             ("position_stiffness", self.position_stiffness),
             ("max_step_px", self.max_step_px),
             ("minimum_altitude", self.minimum_altitude),

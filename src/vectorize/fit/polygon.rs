@@ -70,6 +70,11 @@ impl Polygon {
         }
     }
 
+    /// The same, `scale` times as large.
+    pub(super) fn enlarged(&self, scale: f64) -> Self {
+        Self { corners: self.corners.map(|corner| corner * scale), len: self.len }
+    }
+
     /// Rows of pixels that it touches.
     pub(super) fn rows(&self, height: u32) -> Range<u32> {
         touched(bounds(&self.corners[..self.len], 1), height)

@@ -64,7 +64,7 @@ pub(super) fn optimize_positions(
         } else {
             patch.mesh.positions = before;
             state.evidence = tried.evidence;
-            state.measure(patch, model, frames);
+            state.measure(patch, model, frames, params);
             damping *= DAMPING_BAD;
             if damping > DAMPING_RANGE[1] {
                 break;
@@ -99,15 +99,16 @@ impl State {
 
     /// Measures at the patch's positions and lets the colours follow.
     fn look(&mut self, patch: &Patch, model: &Model, frames: &Volume, params: &FitParams) {
-        self.measure(patch, model, frames);
+        self.measure(patch, model, frames, params);
         self.colors.optimize(model, &self.evidence, params.color_steps_between, params);
         self.error = self.evidence.squared_error(model, &self.colors.now);
     }
 
-    fn measure(&mut self, patch: &Patch, model: &Model, frames: &Volume) {
+    fn measure(&mut self, patch: &Patch, model: &Model, frames: &Volume, params: &FitParams) {
         let points = model.points(&patch.mesh.positions);
         let evidence = std::mem::take(&mut self.evidence);
-        self.evidence = evidence.gather(model, &points, &model.node_colors(&self.colors.now), frames);
+        let colors = model.node_colors(&self.colors.now);
+        self.evidence = evidence.gather(model, (&points, &colors), frames, params.quarter_weight);
     }
 
     fn step(&self, patch: &Patch, model: &Model, params: &FitParams, damping: f32) -> Wish {

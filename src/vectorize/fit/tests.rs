@@ -391,7 +391,12 @@ fn the_error_answers_to_moves_as_the_equations_say() {
         let mut colors = Colors::new(patch.mesh.wedges.iter().map(|w| w.color).collect(), &patch.free_wedges());
         let gather = |mesh: &TetMesh, colors: &Colors| {
             let points = model.points(&mesh.positions);
-            Evidence::default().gather(&model, &points, &model.node_colors(&colors.now), &frames)
+            Evidence::default().gather(
+                &model,
+                (&points, &model.node_colors(&colors.now)),
+                &frames,
+                params.quarter_weight,
+            )
         };
         let evidence = gather(&patch.mesh, &colors);
         colors.optimize(&model, &evidence, params.color_iterations, &params);
