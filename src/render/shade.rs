@@ -98,6 +98,9 @@ pub(super) struct Run {
 }
 
 impl Run {
+    pub(super) const NOTHING: Self =
+        Self { base: [0; 3], right: [0; 3], down: [0; 3], origin: [0; 2], columns: 0, way: Way::Chunks };
+
     /// The colour of a patch on a canvas: of at most so many columns from a pixel on.
     #[inline]
     pub(super) fn new(patch: &Patch, space: ColorSpace, origin: [i32; 2], columns: u32) -> Self {
