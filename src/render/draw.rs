@@ -15,7 +15,7 @@ use super::pack::{BAND_ROWS, Band, bands};
 use super::parallel::{List, for_each};
 use super::scan::{GridPoint, bounds, scan, touched, turn};
 use super::scene::{CHUNK, Polygon, Scene};
-use super::shade::{Run, Shade};
+use super::shade::Run;
 use super::view::{View, Viewport, ViewportError, plane};
 use crate::mesh::TetMesh;
 use crate::video::Surface;
@@ -123,20 +123,20 @@ impl Piece {
     }
 }
 
-/// Pieces in the order of painting, and for anti-aliasing the shade of each.
+/// Pieces in the order of painting, and for anti-aliasing the colours of each.
 #[derive(Debug, Default)]
 pub(super) struct Pieces {
     pieces: Vec<Piece>,
     /// First and end row of each: all that sorting into bands reads.
     rows: Vec<[i32; 2]>,
-    shades: Vec<Shade>,
+    colors: Vec<[Vec3; 4]>,
 }
 
 impl List for Pieces {
     fn clear(&mut self) {
         self.pieces.clear();
         self.rows.clear();
-        self.shades.clear();
+        self.colors.clear();
     }
 }
 
@@ -161,7 +161,7 @@ impl Pieces {
             boundary: patch.boundary,
         });
         if antialias {
-            self.shades.push(Shade::new(patch));
+            self.colors.push(patch.colors);
         }
     }
 }
@@ -293,7 +293,7 @@ impl Painter {
             let pieces = picture.named(names).map(|(list, place)| &list.pieces[place]);
             crossed.start(picture.view, rows.clone(), pieces.map(|piece| (piece.corners(), piece.boundary)));
             for (list, place) in picture.named(names) {
-                crossed.add(list.pieces[place].corners(), &list.shades[place]);
+                crossed.add(list.pieces[place].corners(), &list.colors[place]);
             }
             crossed.paint(canvas);
         }
