@@ -33,7 +33,7 @@ cargo test --locked --workspace --exclude gst-plugin-tetvec
 # A warning of GStreamer or GLib is a bug of ours, except in whole players: appsink of 1.22 warns of its own accord when
 # caps change while the application holds a sample.
 G_DEBUG=fatal_warnings cargo test --locked -p gst-plugin-tetvec --lib --test decoder --test encoder --test parser
-cargo test --locked -p gst-plugin-tetvec --test playback
+cargo test --locked -p gst-plugin-tetvec --test playback --test matrix
 cargo test --locked -p tetvec --no-default-features
 cargo test --locked -p tetvec --no-default-features --features encode
 

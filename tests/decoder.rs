@@ -10,8 +10,8 @@ use tetvec::bitstream::{Fraction, SequenceHeader, SlabWriter};
 use tetvec::mesh::{Domain, TetMesh};
 use tetvec::render::DrawParams;
 use tetvec::{
-    DecodeError, Decoder, DecoderConfig, Packet, PixelFormat, Plane, SequenceHeader as Header, Surface, Viewport,
-    YuvMatrix,
+    DecodeError, Decoder, DecoderConfig, Packet, PixelFormat, Plane, RenderParams, SequenceHeader as Header, Surface,
+    Viewport, YuvMatrix,
 };
 
 const SIZE: (u32, u32) = (97, 71);
@@ -64,6 +64,31 @@ fn pictures_do_not_depend_on_when_they_are_drawn() {
                 assert!(picture(&mut live, frame) == picture(&mut late, frame), "level {levels} at {frame}");
             }
         }
+    }
+}
+
+/// A picture drawn while the next packet is decoded is the one before that packet, a keyframe and a damaged one included.
+#[test]
+fn drawing_and_decoding_at_once_is_one_after_the_other() {
+    let (mut packets, _) = slab(0, 3);
+    packets.extend(slab(u64::from(FRAMES), 4).0);
+    let damaged = packets.len() - 3;
+    let last = packets[damaged].data.len() - 1;
+    packets[damaged].data[last] ^= 1;
+    let (mut both, mut turns) = (decoder(1), decoder(1));
+    for decoder in [&mut both, &mut turns] {
+        decoder.send_packet(&packets[0].data).expect("a keyframe");
+    }
+    for (k, next) in packets.iter().enumerate().skip(1) {
+        let params = RenderParams { frame: k as f64 - 1.0, ..RenderParams::default() };
+        let mut data = vec![0; 3 * (SIZE.0 * SIZE.1) as usize];
+        let planes = vec![Plane { data: &mut data, stride: 3 * SIZE.0 as usize }];
+        let mut surface = Surface::try_new(PixelFormat::Rgb, YuvMatrix::Bt601, SIZE, planes).expect("a surface");
+        let (drawn, sent) = both.render_and_send(&params, &mut surface, &next.data);
+        assert_eq!(drawn, Ok(()));
+        assert_eq!(picture(&mut turns, params.frame), Ok(data), "frame {k}");
+        assert_eq!(turns.send_packet(&next.data), sent, "packet {k}");
+        assert_eq!(sent.is_ok(), k < damaged, "packet {k}");
     }
 }
 

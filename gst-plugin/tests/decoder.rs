@@ -379,7 +379,7 @@ fn a_viewport_shows_a_part() {
 }
 
 #[test]
-fn a_viewport_follows_its_controller_and_its_owner() {
+fn a_viewport_may_change_while_playing() {
     let file = TempFile::new(&stream(10));
     let caps = "video/x-raw,format=RGB,width=48,height=32";
     let description = format!("{} ! tetvecparse ! tetvecdec name=decoder viewport-x=-48 ! {caps}", file.source());

@@ -10,7 +10,7 @@
 
 use std::ops::Range;
 
-use glam::{Vec3A, Vec4};
+use glam::{Vec3, Vec3A, Vec4};
 
 use super::canvas::Canvas;
 use super::coverage::Coverage;
@@ -101,8 +101,8 @@ impl Crossed {
         }
     }
 
-    /// Adds what a polygon, whose colours are `shade`, covers of the pixels.
-    pub(super) fn add(&mut self, corners: &[GridPoint], shade: &Shade) {
+    /// Adds what a polygon with these colours at its corners covers of the pixels.
+    pub(super) fn add(&mut self, corners: &[GridPoint], colors: &[Vec3; 4]) {
         if self.sums.is_empty() {
             return;
         }
@@ -116,6 +116,7 @@ impl Crossed {
         if tiles.peek().is_none() {
             return;
         }
+        let shade = Shade::new(corners, colors);
         let coverage = Coverage::new(corners, [columns.start, rows.start]);
         for tile in tiles {
             let in_tile = (tile * TILE) as i32..((tile + 1) * TILE) as i32;

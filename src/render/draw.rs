@@ -15,7 +15,7 @@ use super::pack::{BAND_ROWS, Band, bands};
 use super::parallel::{List, for_each};
 use super::scan::{GridPoint, bounds, scan, touched, turn};
 use super::scene::{CHUNK, Polygon, Scene};
-use super::shade::{Run, Shade};
+use super::shade::Run;
 use super::view::{View, Viewport, ViewportError, plane};
 use crate::mesh::TetMesh;
 use crate::video::Surface;
@@ -107,6 +107,15 @@ pub(super) struct Piece {
 }
 
 impl Piece {
+    const NOTHING: Self = Self {
+        corners: [GridPoint { x: 0, y: 0 }; 4],
+        run: Run::NOTHING,
+        first_row: 0,
+        end_row: 0,
+        count: 0,
+        boundary: 0,
+    };
+
     /// The corners in order.
     #[inline]
     pub(super) fn corners(&self) -> &[GridPoint] {
@@ -114,17 +123,20 @@ impl Piece {
     }
 }
 
-/// Pieces in the order of painting, and for anti-aliasing the shade of each.
+/// Pieces in the order of painting, and for anti-aliasing the colours of each.
 #[derive(Debug, Default)]
 pub(super) struct Pieces {
     pieces: Vec<Piece>,
-    shades: Vec<Shade>,
+    /// First and end row of each: all that sorting into bands reads.
+    rows: Vec<[i32; 2]>,
+    colors: Vec<[Vec3; 4]>,
 }
 
 impl List for Pieces {
     fn clear(&mut self) {
         self.pieces.clear();
-        self.shades.clear();
+        self.rows.clear();
+        self.colors.clear();
     }
 }
 
@@ -139,6 +151,7 @@ impl Pieces {
             bounds(corners, view.columns, view.rows)
         };
         let Some((columns, rows)) = seen else { return };
+        self.rows.push([rows.start, rows.end]);
         self.pieces.push(Piece {
             corners: patch.corners,
             run: Run::new(patch, space, [columns.start, rows.start], columns.len() as u32),
@@ -148,7 +161,7 @@ impl Pieces {
             boundary: patch.boundary,
         });
         if antialias {
-            self.shades.push(Shade::new(patch));
+            self.colors.push(patch.colors);
         }
     }
 }
@@ -206,6 +219,9 @@ pub fn draw(mesh: &TetMesh, frame: f64, params: &DrawParams, surface: &mut Surfa
     scene.draw(frame, params, surface)
 }
 
+/// Pieces that are fetched at a time.
+const BATCH: usize = 16;
+
 /// What a band is painted with; reused from band to band and from picture to picture.
 #[derive(Debug)]
 struct Painter {
@@ -258,22 +274,26 @@ impl Painter {
         let (rows, width) = (band.rows(), picture.view.columns as usize);
         let space = band.space();
         canvas.start(space, width, rows.len());
-        for (list, place) in picture.named(names) {
-            let piece = &list.pieces[place];
-            let both = piece.first_row.max(rows.start)..piece.end_row.min(rows.end);
-            let brush = piece.run.brush(space);
-            scan(piece.corners(), both, |row, columns| {
-                let columns = columns.start.max(0) as usize..columns.end.clamp(0, width as i64) as usize;
-                if !columns.is_empty() {
-                    brush.paint(canvas.row_mut((row - rows.start) as usize), row, columns);
-                }
-            });
+        for names in names.chunks(BATCH) {
+            // Pieces lie far apart: fetched in one go, the waits for them overlap.
+            let mut pieces = [Piece::NOTHING; BATCH];
+            pieces.iter_mut().zip(picture.named(names)).for_each(|(piece, (list, place))| *piece = list.pieces[place]);
+            for piece in &pieces[..names.len()] {
+                let both = piece.first_row.max(rows.start)..piece.end_row.min(rows.end);
+                let brush = piece.run.brush(space);
+                scan(piece.corners(), both, |row, columns| {
+                    let columns = columns.start.max(0) as usize..columns.end.clamp(0, width as i64) as usize;
+                    if !columns.is_empty() {
+                        brush.paint(canvas.row_mut((row - rows.start) as usize), row, columns);
+                    }
+                });
+            }
         }
         if picture.antialias {
             let pieces = picture.named(names).map(|(list, place)| &list.pieces[place]);
             crossed.start(picture.view, rows.clone(), pieces.map(|piece| (piece.corners(), piece.boundary)));
             for (list, place) in picture.named(names) {
-                crossed.add(list.pieces[place].corners(), &list.shades[place]);
+                crossed.add(list.pieces[place].corners(), &list.colors[place]);
             }
             crossed.paint(canvas);
         }
@@ -300,11 +320,10 @@ struct BandTable {
 
 impl BandTable {
     fn new(lists: &[Pieces], rows: usize) -> Self {
-        let bands_of =
-            |piece: &Piece| piece.first_row as usize / BAND_ROWS..(piece.end_row as usize - 1) / BAND_ROWS + 1;
+        let bands_of = |&[first, end]: &[i32; 2]| first as usize / BAND_ROWS..(end as usize - 1) / BAND_ROWS + 1;
         let mut start = vec![0u32; rows.div_ceil(BAND_ROWS) + 1];
-        for piece in lists.iter().flat_map(|list| &list.pieces) {
-            bands_of(piece).for_each(|band| start[band + 1] += 1);
+        for rows in lists.iter().flat_map(|list| &list.rows) {
+            bands_of(rows).for_each(|band| start[band + 1] += 1);
         }
         for band in 1..start.len() {
             start[band] += start[band - 1];
@@ -312,8 +331,8 @@ impl BandTable {
         let mut next = start.clone();
         let mut names = vec![0; start[start.len() - 1] as usize];
         for (number, list) in lists.iter().enumerate() {
-            for (place, piece) in list.pieces.iter().enumerate() {
-                for band in bands_of(piece) {
+            for (place, rows) in list.rows.iter().enumerate() {
+                for band in bands_of(rows) {
                     names[next[band] as usize] = (number << NAME_BITS | place) as u32;
                     next[band] += 1;
                 }

@@ -30,6 +30,8 @@ pub(super) struct FineNode {
 }
 
 impl FineNode {
+    pub(super) const ZERO: Self = Self { position: IVec3::ZERO, color: IVec3::ZERO };
+
     /// RGB in 8-bit levels.
     #[inline]
     pub(super) fn levels(&self) -> Vec3 {
@@ -137,7 +139,7 @@ impl Refiner {
     pub(super) fn extend(&mut self, complex: &Complex) {
         let first = self.spans.len();
         self.stars.extend(complex);
-        self.corners.resize(complex.nodes.len(), FineNode { position: IVec3::ZERO, color: IVec3::ZERO });
+        self.corners.resize(complex.nodes.len(), FineNode::ZERO);
         self.owned.resize(complex.points.len(), Box::default());
         self.gathered.resize(complex.points.len(), false);
         self.reach.resize(complex.points.len(), Span::EMPTY);

@@ -19,6 +19,9 @@ const SECOND_TETS: usize = 1 << 19;
 /// Tets that a thread slices at a time.
 pub(super) const CHUNK: usize = 512;
 
+/// Tets whose corners are fetched at a time.
+const BATCH: usize = 32;
+
 /// A slab's control mesh, ready to be cut by planes. It grows with the mesh; what was refined is kept.
 #[derive(Debug)]
 pub struct Scene {
@@ -117,9 +120,16 @@ impl Scene {
     ) {
         if levels == 0 {
             let tets = self.active.cut(&self.spans, t);
-            return collect(lists, tets, |polygons, tet| {
-                let nodes = self.complex.tets[tet as usize].map(|node| self.nodes[node as usize]);
-                slice(nodes, t, self.interfaces.faces(tet), |polygon| make(polygons, tet, polygon));
+            let corners = |tet: u32| self.complex.tets[tet as usize].map(|node| self.nodes[node as usize]);
+            return fill_chunks(lists, tets.len(), CHUNK, |list, run| {
+                for tets in tets[run].chunks(BATCH) {
+                    // Nodes lie far apart: fetched in one go, the waits for them overlap.
+                    let mut nodes = [[FineNode::ZERO; 4]; BATCH];
+                    nodes.iter_mut().zip(tets).for_each(|(nodes, &tet)| *nodes = corners(tet));
+                    for (nodes, &tet) in nodes.iter().zip(tets) {
+                        slice(nodes, t, self.interfaces.faces(tet), |polygon| make(list, tet, polygon));
+                    }
+                }
             });
         }
         self.refiner.extend(&self.complex);
@@ -200,14 +210,14 @@ impl Parent<'_> {
         let (refiner, complex) = self.level;
         let nodes = refiner.ten(complex, self.tet);
         for child in refiner.children(self.tet) {
-            slice(child.map(|i| nodes[i as usize]), t, child_faces(*child, self.faces), &mut polygon);
+            slice(&child.map(|i| nodes[i as usize]), t, child_faces(*child, self.faces), &mut polygon);
         }
     }
 }
 
 /// Slices one tet.
 #[inline]
-fn slice(nodes: [FineNode; 4], t: i32, faces: Faces, mut polygon: impl FnMut(Polygon<'_>)) {
+fn slice(nodes: &[FineNode; 4], t: i32, faces: Faces, mut polygon: impl FnMut(Polygon<'_>)) {
     let edges = SLICES[above(nodes.map(|node| node.position), t)];
     if edges.is_empty() {
         return;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::{DVec3, Vec3A};
+use glam::{DVec3, Vec3, Vec3A};
 use wide::{i16x8, u8x16};
 
 use super::canvas::{CHUNK, ColorSpace};
@@ -22,12 +22,11 @@ pub(super) struct Shade {
 }
 
 impl Shade {
-    /// The field that a patch's first three corners give.
-    pub(super) fn new(patch: &Patch) -> Self {
-        let corners = patch.corners();
-        let colors = patch.colors.map(Vec3A::from);
+    /// The field that the colours at the first three corners give.
+    pub(super) fn new(corners: &[GridPoint], colors: &[Vec3; 4]) -> Self {
+        let colors = colors.map(Vec3A::from);
         let (low, high) = range(&colors[..corners.len()]);
-        let [right, down] = gradient(&patch.corners, &colors);
+        let [right, down] = gradient([corners[0], corners[1], corners[2]], &colors);
         let (right, down) = (right.as_vec3a(), down.as_vec3a());
         Self { corner: corners[0], color: colors[0], right, down, low, high }
     }
@@ -53,10 +52,10 @@ const PIXEL: f64 = 1.0 / (1i64 << GRID_BITS) as f64;
 
 /// How the linear field that takes the colours at the first three corners changes a pixel to the right and down.
 #[inline]
-fn gradient(corners: &[GridPoint; 4], colors: &[Vec3A; 4]) -> [DVec3; 2] {
+fn gradient(corners: [GridPoint; 3], colors: &[Vec3A; 4]) -> [DVec3; 2] {
     let [along_u, along_v] = [colors[1], colors[2]].map(|color| (color - colors[0]).as_dvec3());
     let side = |to: GridPoint| [(to.x - corners[0].x) as f64 * PIXEL, (to.y - corners[0].y) as f64 * PIXEL];
-    let scale = 1.0 / double_area([corners[0], corners[1], corners[2]]);
+    let scale = 1.0 / double_area(corners);
     let ([ux, uy], [vx, vy]) = (side(corners[1]), side(corners[2]));
     [along_u * (vy * scale) - along_v * (uy * scale), along_v * (ux * scale) - along_u * (vx * scale)]
 }
@@ -98,6 +97,9 @@ pub(super) struct Run {
 }
 
 impl Run {
+    pub(super) const NOTHING: Self =
+        Self { base: [0; 3], right: [0; 3], down: [0; 3], origin: [0; 2], columns: 0, way: Way::Chunks };
+
     /// The colour of a patch on a canvas: of at most so many columns from a pixel on.
     #[inline]
     pub(super) fn new(patch: &Patch, space: ColorSpace, origin: [i32; 2], columns: u32) -> Self {
@@ -122,7 +124,7 @@ impl Run {
         };
         let (low, high) = hull(corners);
         let extent = ((high.x - low.x).max(high.y - low.y)) as f64 * PIXEL;
-        let [mut right, mut down] = gradient(&patch.corners, &colors);
+        let [mut right, mut down] = gradient([corners[0], corners[1], corners[2]], &colors);
         let steepest = right.abs().max_element().max(down.abs().max_element());
         // What is no number does not hold either.
         let holds = steepest * extent.max(1.0) < STEEPEST;
@@ -273,8 +275,6 @@ const MASKS: [[u8; CHUNK]; CHUNK] = {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
-
     use super::*;
 
     /// The first row of a polygon in RGB.

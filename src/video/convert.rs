@@ -77,12 +77,10 @@ impl YuvMatrix {
     /// Y, Cb, Cr of a colour in RGB levels, not rounded.
     #[inline]
     pub(crate) fn of_levels(self, rgb: Vec3A) -> Vec3A {
-        let row = |[r, g, b]: [i64; 3], offset: i32| {
-            const ONE: f32 = (1 << BITS) as f32;
-            (r as f32 * rgb.x + g as f32 * rgb.y + b as f32 * rgb.z) / ONE + offset as f32
-        };
-        let [y, cb, cr] = self.forward();
-        Vec3A::new(row(y, OFFSETS[0]), row(cb, OFFSETS[1]), row(cr, OFFSETS[2]))
+        const COLUMNS: [[Vec3A; 3]; 2] = [columns(YuvMatrix::Bt601.forward()), columns(YuvMatrix::Bt709.forward())];
+        const BLACK: Vec3A = Vec3A::new(OFFSETS[0] as f32, OFFSETS[1] as f32, OFFSETS[2] as f32);
+        let [r, g, b] = COLUMNS[usize::from(self == Self::Bt709)];
+        r * rgb.x + g * rgb.y + b * rgb.z + BLACK
     }
 
     /// What luma gives to all channels, then R from Cr, G from Cb, G from Cr, B from Cb.
@@ -110,6 +108,18 @@ pub(crate) fn rgb_to_yuv(matrix: YuvMatrix, rgb: [i32; 3]) -> [u8; 3] {
 
 /// What Y, Cb and Cr of black are.
 const OFFSETS: [i32; 3] = [16, 128, 128];
+
+/// What each of R, G and B adds to Y, Cb and Cr.
+const fn columns(rows: [[i64; 3]; 3]) -> [Vec3A; 3] {
+    const ONE: f32 = (1 << BITS) as f32;
+    let mut columns = [Vec3A::ZERO; 3];
+    let mut i = 0;
+    while i < 3 {
+        columns[i] = Vec3A::new(rows[0][i] as f32 / ONE, rows[1][i] as f32 / ONE, rows[2][i] as f32 / ONE);
+        i += 1;
+    }
+    columns
+}
 
 const fn narrow(rows: [[i64; 3]; 3]) -> [[i32; 3]; 3] {
     let mut narrow = [[0; 3]; 3];
