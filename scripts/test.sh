@@ -43,6 +43,13 @@ RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps
 step "examples and benches"
 cargo build --locked --workspace --examples --benches
 
+step "miri"
+if cargo +nightly miri --version >/dev/null 2>&1; then
+    MIRIFLAGS=-Zmiri-disable-isolation cargo +nightly miri test --locked --no-default-features --features encode --lib -- bitstream
+else
+    echo "miri is not installed: the stream's modules are not interpreted"
+fi
+
 # Without coverage and for some seconds only: a look whether the targets still hold.
 step "fuzz targets"
 cargo clippy --locked --manifest-path fuzz/Cargo.toml --no-default-features -- -D warnings

@@ -22,6 +22,7 @@ mod range_coder;
 mod slab;
 #[cfg(feature = "encode")]
 mod source;
+mod stars;
 mod symbols;
 #[cfg(feature = "encode")]
 mod writer;

@@ -261,7 +261,8 @@ mod tests {
 
     #[test]
     fn decisions_come_back_and_cost_about_their_entropy() {
-        for seed in 0..200 {
+        // Miri is a thousand times slower.
+        for seed in 0..if cfg!(miri) { 8 } else { 200 } {
             let decisions = decisions(seed, seed as usize * 37);
             let mut encoder = RangeEncoder::new();
             let mut models = [BitModel::NEW; 4];
@@ -298,7 +299,7 @@ mod tests {
     fn probabilities_stay_inside() {
         for bit in [false, true] {
             let mut model = BitModel::NEW;
-            for _ in 0..100_000 {
+            for _ in 0..if cfg!(miri) { 1_000 } else { 100_000 } {
                 model.update(bit);
                 assert!((32..=65_504).contains(&model.probability()));
             }

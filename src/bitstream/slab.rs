@@ -19,6 +19,7 @@ use super::hops::{Hops, RINGS};
 use super::labels::LabelModels;
 use super::positions::{Behind, Bounds, PositionModels, code_free_position, code_position};
 use super::range_coder::{BitCoder, BitModel};
+use super::stars::Stars;
 use super::{Limits, MeshFault};
 use crate::mesh::{Domain, FACES, TetMesh, VertexId, volume6};
 
@@ -89,23 +90,14 @@ pub(super) struct Slab {
     /// Per vertex its youngest wedge, per wedge the next older one of its vertex.
     wedge_head: Vec<u32>,
     wedge_next: Vec<u32>,
-    /// Per vertex the youngest (tet, corner) as 4 tet + corner.
-    star_head: Vec<u32>,
+    stars: Stars,
     extents: Extents,
-    linked: Vec<LinkedTet>,
-    /// Per vertex the hop that its neighbours have been told, and its youngest slot then.
+    /// Vertices of each tet: the mesh has them only by way of its wedges.
+    corners: Vec<[VertexId; 4]>,
+    /// Per vertex the hop that its neighbours have been told, and how many tets it had then.
     passed_on: Vec<(u8, u32)>,
     /// Lengths of the mesh's arrays, and its duration, when the last packet was complete.
     complete: Complete,
-}
-
-/// A tet in the lists of its vertices' stars.
-#[derive(Debug, Clone, Copy)]
-struct LinkedTet {
-    /// Its vertices: the mesh has them only by way of its wedges.
-    corners: [VertexId; 4],
-    /// Per corner the next older slot of the vertex there.
-    older: [u32; 4],
 }
 
 /// How much of a mesh is complete.
@@ -155,9 +147,9 @@ impl Slab {
             last_wedge: Vec::new(),
             wedge_head: Vec::new(),
             wedge_next: Vec::new(),
-            star_head: Vec::new(),
+            stars: Stars::default(),
             extents: Extents::default(),
-            linked: Vec::new(),
+            corners: Vec::new(),
             passed_on: Vec::new(),
             complete: Complete { duration: 1, ..Complete::default() },
         }
@@ -257,19 +249,16 @@ impl Slab {
     /// The neighbours of `vertex`, whose star is complete, are one edge farther. Tets that were there the last time
     /// are passed over, so that all visits together are linear in the star.
     fn pass_hop_on(&mut self, vertex: VertexId, hop: u8) {
-        let youngest = self.star_head[vertex.index()];
         if hop == RINGS {
             return;
         }
-        let (told, until) = std::mem::replace(&mut self.passed_on[vertex.index()], (hop, youngest));
-        let until = if told == hop { until } else { NONE };
-        let mut slot = youngest;
-        while slot != until {
-            let tet = &self.linked[slot as usize / 4];
-            for neighbour in tet.corners {
+        let count = self.stars.count(vertex);
+        let (told, before) = std::mem::replace(&mut self.passed_on[vertex.index()], (hop, count));
+        let new = if told == hop { count - before } else { count };
+        for tet in self.stars.at(vertex).take(new as usize) {
+            for neighbour in self.corners[tet as usize] {
                 self.hops.lower(neighbour, hop + 1);
             }
-            slot = tet.older[slot as usize % 4];
         }
     }
 
@@ -323,7 +312,7 @@ impl Slab {
 
     /// Codes the new vertex behind a gate.
     fn code_apex_vertex(&mut self, side: &mut impl Side, before: u32, gate: &Gate) -> Result<VertexId, MeshFault> {
-        let corners = self.linked[before as usize].corners;
+        let corners = self.corners[before as usize];
         let opposite = corners.into_iter().find(|v| !gate.corners.contains(v)).unwrap_or(corners[0]);
         let at = |v: VertexId| self.mesh.positions[v.index()];
         let behind = Behind {
@@ -363,9 +352,9 @@ impl Slab {
         self.mesh.pinned[vertex.index()] = pinned;
         self.front.push_vertex();
         self.wedge_head.push(NONE);
-        self.star_head.push(NONE);
+        self.stars.push_vertex();
         self.extents.push_vertex();
-        self.passed_on.push((u8::MAX, NONE));
+        self.passed_on.push((u8::MAX, 0));
         let frame = (position.z >> self.bounds.domain.subpixel_bits) as u32;
         self.hops.push_vertex(frame);
         if !self.bounds.top_known {
@@ -412,7 +401,7 @@ impl Slab {
         }
         let positions = corners.map(|v| self.mesh.positions[v.index()]);
         self.check_positive(volume6(positions[0], positions[1], positions[2], positions[3]))?;
-        let is_new = gate.is_some() && self.star_head[corners[3].index()] == NONE;
+        let is_new = gate.is_some() && self.stars.count(corners[3]) == 0;
         let facing = [0, 1, 2, 3].map(|face| match gate {
             // The gate is face 3, opposite the apex; a new apex has no other open face.
             Some(_) if face == 3 => gate,
@@ -423,11 +412,8 @@ impl Slab {
         let label = self.code_tet_label(side, corners, gate, facing)?;
         let wedges = self.code_wedges(side, corners, label)?;
         self.mesh.tets.push(wedges);
-        let older = [0, 1, 2, 3].map(|corner| {
-            let head = &mut self.star_head[corners[corner].index()];
-            std::mem::replace(head, tet * 4 + corner as u32)
-        });
-        self.linked.push(LinkedTet { corners, older });
+        self.corners.push(corners);
+        self.stars.push_tet(tet, corners);
         self.extents.learn(corners, positions);
         for (face, closed) in FACES.into_iter().zip(facing) {
             let corners = face.map(|c| corners[c]);

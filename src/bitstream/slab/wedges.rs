@@ -135,16 +135,13 @@ impl Slab {
     fn around(&self, wedge: usize) -> Around {
         let mut around = Around::default();
         let Wedge { vertex, .. } = self.mesh.wedges[wedge];
-        let mut slot = self.star_head[vertex.index()];
-        for _ in 0..STAR_SCAN {
-            let Some(linked) = self.linked.get(slot as usize / 4) else { break };
-            let corners = self.mesh.tets[slot as usize / 4];
-            if corners[slot as usize % 4].index() == wedge {
-                for other in corners.into_iter().filter(|w| w.index() < wedge) {
+        for tet in self.stars.at(vertex).take(STAR_SCAN) {
+            let wedges = self.mesh.tets[tet as usize];
+            if wedges.iter().any(|w| w.index() == wedge) {
+                for other in wedges.into_iter().filter(|w| w.index() < wedge) {
                     around.add(self.steps[other.index()], self.misses[other.index()]);
                 }
             }
-            slot = linked.older[slot as usize % 4];
         }
         if around.is_empty() && wedge > 0 {
             around.add(self.steps[wedge - 1], [0; 2]);
