@@ -134,13 +134,19 @@ impl<'a> Fitting<'a> {
         self.report.rms_colors = self.rms(&evidence);
     }
 
+    /// Half of the steps without quarters of pixels, which cost as much as all else and hardly matter on the way.
     fn positions(&mut self) {
-        let (patch, model, colors) = (&mut self.patch, &self.model, &mut self.colors);
-        let (evidence, refined) = refine::optimize_positions(patch, model, colors, self.frames, self.params);
-        self.report.position_steps = refined.steps;
-        self.report.refused_moves += refined.refused;
-        self.report.rms_positions = self.rms(&evidence);
-        self.follow_positions();
+        let all = self.params.position_iterations;
+        let rough = FitParams { position_iterations: all / 2, quarter_weight: 0.0, ..self.params.clone() };
+        let fine = FitParams { position_iterations: all - all / 2, ..self.params.clone() };
+        for params in [rough, fine] {
+            let (patch, model, colors) = (&mut self.patch, &self.model, &mut self.colors);
+            let (evidence, refined) = refine::optimize_positions(patch, model, colors, self.frames, &params);
+            self.report.position_steps += refined.steps;
+            self.report.refused_moves += refined.refused;
+            self.report.rms_positions = self.rms(&evidence);
+            self.follow_positions();
+        }
     }
 
     /// Pins what folds at level 1 before positions are optimised, so that they know of it: 0.5 dB better than pins
