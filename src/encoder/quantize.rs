@@ -5,10 +5,11 @@
 //! The error meant is what most of the picture has, not what edges of a drawing have: in its flat parts nothing hides the
 //! steps.
 
-/// Colour step over the root mean square error within tets. Errors of rounding are independent, and a picture interpolates between
-/// the wedges of a tet, so a step s adds s^2 / 30 to the squared error: 0.12 dB at this ratio. By rate and distortion it
-/// could be coarser on BUNNY360 (1.3) and finer on CUP (docs/benchmarks.md).
-const STEP_OVER_RMS: f64 = 0.95;
+/// Colour step over the root mean square error within tets, which is about seven eighths of that over all pixels on natural
+/// clips. Errors of rounding are independent, and a picture interpolates between the wedges of a tet, so a step s adds
+/// s^2 / 30 to the squared error: 0.15 dB at this ratio. By rate and distortion it could be coarser on BUNNY360 and finer on
+/// CUP (docs/benchmarks.md).
+const STEP_OVER_RMS: f64 = 1.15;
 
 /// Steps in sixteenths of a level: 2 to 8 levels.
 const STEPS: std::ops::RangeInclusive<f64> = 32.0..=128.0;
@@ -34,8 +35,8 @@ mod tests {
 
     #[test]
     fn steps_follow_the_error_within_their_range() {
-        assert_eq!([0.0, 1.2, 4.0, 6.6, 100.0, f64::NAN].map(color_step), [32, 32, 61, 100, 128, 32]);
+        assert_eq!([0.0, 1.2, 4.0, 6.6, 100.0, f64::NAN].map(color_step), [32, 32, 74, 121, 128, 32]);
         let loss = |rms: f64| 20.0 * (rounded_rms(rms, color_step(rms)) / rms).log10();
-        assert!(loss(6.6) < 0.13);
+        assert!(loss(6.6) < 0.19);
     }
 }

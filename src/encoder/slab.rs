@@ -46,7 +46,7 @@ const RUN_ERROR: f32 = 0.25;
 pub(super) const ERROR_GAIN: f64 = 150.0;
 
 /// Most vertices that are fitted at once.
-const FIT_VERTICES: usize = 300_000;
+const FIT_VERTICES: usize = 150_000;
 
 /// How a slab ends.
 #[derive(Debug)]
