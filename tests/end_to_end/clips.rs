@@ -28,6 +28,20 @@ pub(crate) fn bars((width, height): (u32, u32), count: u32) -> Vec<Frame> {
     (0..count).map(|_| Frame::from_fn(width, height, |x, _| bar(x)).expect("a size within the limits")).collect()
 }
 
+/// Rings that run outwards from two places over each other: more than a sparse mesh can hold.
+pub(crate) fn waves((width, height): (u32, u32), count: u32) -> Vec<Frame> {
+    let ring = |x: f64, y: f64, k: u32| (0.8 * x.hypot(y) - 0.4 * f64::from(k)).sin();
+    let picture = |k: u32| {
+        let color = |x: u32, y: u32| {
+            let (x, y) = (f64::from(x), f64::from(y));
+            let sum = ring(x - 20.0, y - 15.0, k) + ring(x - 70.0, y - 40.0, 2 * k);
+            [1.0, 0.8, -0.6].map(|part| (128.0 + 55.0 * part * sum).round() as u8)
+        };
+        Frame::from_fn(width, height, color).expect("a size within the limits")
+    };
+    (0..count).map(picture).collect()
+}
+
 /// Settings for quick tests: short windows, a mesh dense enough for a small picture.
 pub(crate) fn config((width, height): (u32, u32)) -> EncoderConfig {
     EncoderConfig { window: 4, simplification_ratio: 0.1, ..EncoderConfig::new(width, height) }

@@ -5,7 +5,7 @@
 mod clips;
 mod damage;
 
-use clips::{bars, config, decode, disc, encode, picture, psnr};
+use clips::{bars, config, decode, disc, encode, picture, psnr, waves};
 use tetvec::metrics::simplification_ratio;
 use tetvec::{
     DecodeError, Decoder, DecoderConfig, EncodeError, Encoder, EncoderConfig, ErrorMetric, Event, Frame, Stage, Surface,
@@ -106,7 +106,7 @@ fn settings_reach_the_stream() {
 #[test]
 fn refits_pay() {
     const LARGE: (u32, u32) = (96, 64);
-    let frames = disc(LARGE, 0, 6);
+    let frames = waves(LARGE, 6);
     let with = |refits: u32| {
         let settings = EncoderConfig { refits, window: 60, simplification_ratio: 0.03, ..config(LARGE) };
         let stream = encode(&frames, settings, &[]);
@@ -114,7 +114,7 @@ fn refits_pay() {
     };
     let ((vertices, without), (again, refitted)) = (with(0), with(2));
     assert_eq!(vertices, again);
-    assert!(refitted > without + 0.3, "{without:.2} dB without, {refitted:.2} dB with two");
+    assert!(refitted > without + 0.5, "{without:.2} dB without, {refitted:.2} dB with two");
 }
 
 #[test]
