@@ -53,6 +53,15 @@ pub(crate) fn yuv_matrix(info: &gst_video::VideoInfo) -> YuvMatrix {
     }
 }
 
+/// How the core reads pictures of `info`; `None` where it does not know the format, the matrix or the range.
+pub(crate) fn core_conversion(info: &gst_video::VideoInfo) -> Option<(PixelFormat, YuvMatrix)> {
+    let format = pixel_format(info.format())?;
+    let colorimetry = info.colorimetry();
+    let known = colorimetry.range() == gst_video::VideoColorRange::Range16_235
+        && matches!(colorimetry.matrix(), gst_video::VideoColorMatrix::Bt601 | gst_video::VideoColorMatrix::Bt709);
+    (info.is_rgb() || known).then(|| (format, yuv_matrix(info)))
+}
+
 /// A ratio as the core writes it; `default` where it is negative.
 pub(crate) fn to_core(fraction: gst::Fraction, default: Fraction) -> Fraction {
     match (u32::try_from(fraction.numer()), u32::try_from(fraction.denom())) {

@@ -4,7 +4,7 @@ mod pipeline;
 
 use gst::ClockTime;
 use gst::prelude::*;
-use pipeline::{ENCODER, RATE, encode, init, packets, raw, time_of};
+use pipeline::{ENCODER, RATE, TempFile, encode, init, packets, raw, run, time_of};
 use tetvec::{EncoderConfig, SpeedPreset};
 
 /// A harness with an encoder of small windows and keyframes every five frames.
@@ -66,6 +66,32 @@ fn every_format_and_odd_sizes_are_encoded() {
             assert_eq!((structure.get("parsed"), structure.get("alignment")), (Ok(true), Ok("frame")));
             assert!(structure.has_field("codec_data"));
         }
+    }
+}
+
+/// A flat picture comes out in the colour that its format and colorimetry can hold.
+#[test]
+fn every_format_keeps_its_colours() {
+    init();
+    let color = [33, 48, 95];
+    let formats = ["RGB", "xRGB", "xBGR", "BGR"].map(|format| (format, "sRGB"));
+    let luma = ["I420", "NV12", "YV12", "NV21", "Y42B", "Y444", "YUY2", "UYVY"];
+    let luma = luma.into_iter().flat_map(|format| [(format, "bt601"), (format, "bt709"), (format, "1:4:0:0")]);
+    for (format, colorimetry) in formats.into_iter().chain(luma) {
+        // Through 16 bits: the test must not lean on a conversion with an error of its own.
+        let coded = encode(&format!(
+            "videotestsrc num-buffers=1 pattern=solid-color foreground-color=0xff21305f ! video/x-raw,format=RGB ! \
+             videoconvert ! video/x-raw,format=ARGB64 ! videoconvert dither=none ! \
+             video/x-raw,format={format},colorimetry={colorimetry},width=24,height=16,framerate=25/1"
+        ));
+        let mut bytes = Vec::new();
+        coded.buffers().for_each(|buffer| bytes.extend_from_slice(&buffer.map_readable().expect("memory")));
+        let file = TempFile::new(&bytes);
+        let shown = run(&format!("{} ! tetvecparse ! tetvecdec ! video/x-raw,format=RGB", file.source()));
+        let shown = shown.expect_clean().bytes();
+        let (pixels, _) = shown.as_chunks::<3>();
+        let off = pixels.iter().flat_map(|pixel| (0..3).map(|c| pixel[c].abs_diff(color[c]))).max();
+        assert!(off <= Some(2), "{format} {colorimetry}: {:?}", pixels[0]);
     }
 }
 
