@@ -15,8 +15,8 @@ use framed::{body, header_bytes, repair, with_body};
 use meshes::{MeshParams, Random, irregular_mesh};
 use tetvec::Packet;
 use tetvec::bitstream::{
-    Fraction, Index, IndexWriter, Limits, MAGIC, MeshFault, ParseError, Part, SYNC, SequenceHeader, SlabParser,
-    SlabWriter, TAIL_BYTES, VERSION, WriteError, find_packet, index_length, parse_packet_header, quantize_color,
+    ColorSteps, Fraction, Index, IndexWriter, Limits, MAGIC, MeshFault, ParseError, Part, SYNC, SequenceHeader,
+    SlabParser, SlabWriter, TAIL_BYTES, VERSION, WriteError, find_packet, index_length, parse_packet_header,
 };
 use tetvec::mesh::{Domain, TetMesh, validate, volume6};
 use tetvec::video::Label;
@@ -43,20 +43,20 @@ fn small_params(seed: u64) -> MeshParams {
 /// Packets of a slab of `frames` frames.
 fn write_slab(mesh: &TetMesh, first_frame: u64, frames: u32) -> Vec<Packet> {
     let mut writer = SlabWriter::try_new(header_of(mesh.domain), first_frame).expect("a header in range");
-    writer.set_color_step(16).expect("a step in range");
+    writer.set_color_steps(ColorSteps::even(1)).expect("steps in range");
     let packets = (0..frames).map(|k| writer.write_packet(mesh, k + 1 == frames).expect("a tiling")).collect();
     assert!(writer.is_drained());
     packets
 }
 
-/// A tet by what does not depend on numbering: its corners' positions and colours in steps, ascending.
+/// A tet by what does not depend on numbering: its corners' positions and colours in levels, ascending.
 type TetKey = [([i32; 3], [i32; 3]); 4];
 
-fn tet_keys(mesh: &TetMesh, color_step: u8, wanted: impl Fn(usize) -> bool) -> BTreeSet<TetKey> {
+fn tet_keys(mesh: &TetMesh, wanted: impl Fn(usize) -> bool) -> BTreeSet<TetKey> {
     let key = |tet: usize| {
         let mut key = mesh.tets[tet].map(|w| {
-            let color = quantize_color(mesh.wedges[w.index()].color, color_step);
-            (mesh.position(w).to_array(), (color * 16.0).as_ivec3().to_array())
+            let color = mesh.wedges[w.index()].color.round().clamp(glam::Vec3::splat(-128.0), glam::Vec3::splat(383.0));
+            (mesh.position(w).to_array(), color.as_ivec3().to_array())
         });
         key.sort_unstable();
         key
@@ -93,8 +93,8 @@ fn slabs_come_back_packet_by_packet() {
             assert_eq!(parser.frames_complete(), k as u32 + 1);
             let parsed = parser.mesh().expect("a keyframe was parsed");
             let in_packet = tets_by_hop_rule(&mesh, k as i32);
-            let expected = tet_keys(&mesh, 16, |tet| k == 7 || in_packet[tet]);
-            assert_eq!(tet_keys(parsed, 16, |_| true), expected, "packet {k} of mesh {seed}");
+            let expected = tet_keys(&mesh, |tet| k == 7 || in_packet[tet]);
+            assert_eq!(tet_keys(parsed, |_| true), expected, "packet {k} of mesh {seed}");
         }
         assert!(parser.is_ended());
         assert_same(parser.mesh().expect("a whole slab"), &mesh);
@@ -235,7 +235,7 @@ fn meshes_of_many_pieces_with_holes_come_back() {
         let (parser, errors) = parse_all(packets.iter().map(|p| &p.data[..]), Limits::default());
         assert_eq!(errors, []);
         let parsed = parser.mesh().expect("a keyframe was parsed");
-        assert_eq!(tet_keys(parsed, 16, |_| true), tet_keys(&mesh, 16, |_| true));
+        assert_eq!(tet_keys(parsed, |_| true), tet_keys(&mesh, |_| true));
     }
 }
 
@@ -547,9 +547,14 @@ fn a_writer_refuses_what_no_parser_would_take() {
     assert!(matches!(write(&short), Err(WriteError::Mesh(_))));
 
     let mut writer = SlabWriter::try_new(header, 0).expect("a header in range");
-    assert_eq!(writer.set_color_step(0), Err(WriteError::ColorStep { found: 0 }));
+    for found in
+        [ColorSteps { step: 0, size: 40 }, ColorSteps { step: 129, size: 40 }, ColorSteps { step: 1, size: 70 }]
+    {
+        assert_eq!(writer.set_color_steps(found), Err(WriteError::ColorSteps { found }));
+    }
     writer.write_packet(&mesh, false).expect("a tiling");
-    assert_eq!(writer.set_color_step(16), Err(WriteError::ColorStep { found: 16 }));
+    let found = ColorSteps::even(1);
+    assert_eq!(writer.set_color_steps(found), Err(WriteError::ColorSteps { found }));
     let mut shrunk = mesh.clone();
     shrunk.tets.pop();
     assert!(matches!(writer.write_packet(&shrunk, false), Err(WriteError::NotAppended { .. })));

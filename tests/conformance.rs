@@ -18,7 +18,7 @@ use std::process::Command;
 
 use meshes::{MeshParams, Random, irregular_mesh};
 use tetvec::bitstream::{
-    Fraction, IndexWriter, Limits, SequenceHeader, SlabParser, SlabWriter, VERSION, parse_packet_header,
+    ColorSteps, Fraction, IndexWriter, Limits, SequenceHeader, SlabParser, SlabWriter, VERSION, parse_packet_header,
 };
 use tetvec::mesh::{Domain, TetMesh};
 use tetvec::{Encoder, EncoderConfig, Frame};
@@ -28,7 +28,7 @@ fn folder() -> PathBuf {
 }
 
 /// The stream of slabs that follow each other, with an index.
-fn write_stream(slabs: &[TetMesh], color_step: u8) -> Vec<u8> {
+fn write_stream(slabs: &[TetMesh], color_steps: ColorSteps) -> Vec<u8> {
     let mut stream = Vec::new();
     let mut index = IndexWriter::new();
     let mut first_frame = 0;
@@ -43,7 +43,7 @@ fn write_stream(slabs: &[TetMesh], color_step: u8) -> Vec<u8> {
             subdivision_levels: 0,
         };
         let mut writer = SlabWriter::try_new(header, first_frame).expect("a header in range");
-        writer.set_color_step(color_step).expect("a step in range");
+        writer.set_color_steps(color_steps).expect("steps in range");
         for k in 1..=duration {
             let packet = writer.write_packet(mesh, k == duration).expect("a tiling");
             index.push(&packet);
@@ -70,13 +70,26 @@ fn written() -> Vec<(&'static str, Vec<u8>)> {
         let domain = Domain { width: size[0], height: size[1], duration: size[2], subpixel_bits: 3 };
         irregular_mesh(&MeshParams { domain, cells, labels, thinning, seed })
     };
+    let by_size = |step, size| ColorSteps { step, size };
     vec![
-        ("example", write_stream(&[vector::example_mesh()], 16)),
-        ("one-label", write_stream(&[mesh([96, 64, 10], [9, 7, 7], 1, 60, 1)], 32)),
-        ("labels", write_stream(&[mesh([64, 48, 8], [6, 5, 6], 6, 50, 2)], 24)),
-        ("pieces", write_stream(&[pieces()], 16)),
-        ("slabs", write_stream(&[mesh([48, 32, 5], [4, 3, 4], 2, 40, 4), mesh([48, 32, 3], [4, 3, 3], 3, 20, 5)], 40)),
-        ("empty", write_stream(&[TetMesh::empty(Domain { width: 7, height: 5, duration: 2, subpixel_bits: 0 })], 1)),
+        ("example", write_stream(&[vector::example_mesh()], ColorSteps::even(1))),
+        ("one-label", write_stream(&[mesh([96, 64, 10], [9, 7, 7], 1, 60, 1)], by_size(32, 36))),
+        ("labels", write_stream(&[mesh([64, 48, 8], [6, 5, 6], 6, 50, 2)], by_size(24, 34))),
+        ("pieces", write_stream(&[pieces()], by_size(16, 30))),
+        (
+            "slabs",
+            write_stream(
+                &[mesh([48, 32, 5], [4, 3, 4], 2, 40, 4), mesh([48, 32, 3], [4, 3, 3], 3, 20, 5)],
+                by_size(40, 69),
+            ),
+        ),
+        (
+            "empty",
+            write_stream(
+                &[TetMesh::empty(Domain { width: 7, height: 5, duration: 2, subpixel_bits: 0 })],
+                by_size(1, 0),
+            ),
+        ),
     ]
 }
 
@@ -113,8 +126,7 @@ fn describe(stream: &[u8]) -> String {
             before = [0; 3];
         }
         let mesh = parser.mesh().expect("a keyframe was parsed");
-        let color_step = parser.color_step().expect("a keyframe was parsed");
-        let crc = checksum(mesh, before, color_step);
+        let crc = checksum(mesh, before);
         before = [mesh.positions.len(), mesh.wedges.len(), mesh.tets.len()];
         let duration = if parser.is_duration_known() { mesh.domain.duration } else { 0 };
         let [vertices, wedges, tets] = before;
@@ -124,15 +136,15 @@ fn describe(stream: &[u8]) -> String {
 }
 
 /// CRC-32 of what is new since the mesh had so many vertices, wedges and tets: little-endian 32-bit integers.
-fn checksum(mesh: &TetMesh, [vertices, wedges, tets]: [usize; 3], color_step: u8) -> u32 {
+fn checksum(mesh: &TetMesh, [vertices, wedges, tets]: [usize; 3]) -> u32 {
     let mut bytes = Vec::new();
     let mut put = |value: i32| bytes.extend_from_slice(&value.to_le_bytes());
     for (position, pinned) in mesh.positions[vertices..].iter().zip(&mesh.pinned[vertices..]) {
         position.to_array().into_iter().chain([i32::from(*pinned)]).for_each(&mut put);
     }
     for wedge in &mesh.wedges[wedges..] {
-        let steps = wedge.color.to_array().map(|level| (level * 16.0 / f32::from(color_step)).round() as i32);
-        [wedge.vertex.0 as i32, wedge.label.0 as i32].into_iter().chain(steps).for_each(&mut put);
+        let grains = wedge.color.to_array().map(|level| (level * 128.0) as i32);
+        [wedge.vertex.0 as i32, wedge.label.0 as i32].into_iter().chain(grains).for_each(&mut put);
     }
     mesh.tets[tets..].iter().flatten().for_each(|wedge| put(wedge.0 as i32));
     crc32fast::hash(&bytes)

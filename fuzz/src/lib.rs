@@ -87,8 +87,8 @@ pub fn round_trip(data: &[u8]) {
     }
     let (Some(mesh), Some(header)) = (parser.mesh().cloned(), parser.header().copied()) else { return };
     let mut writer = SlabWriter::try_new(header, 7).expect("a header that was parsed");
-    if let Some(step) = parser.color_step() {
-        writer.set_color_step(step).expect("a step that was parsed");
+    if let Some(steps) = parser.color_steps() {
+        writer.set_color_steps(steps).expect("steps that were parsed");
     }
     // Faces that meet as no tiling's do may be refused, but only while writing.
     let Ok(packet) = writer.write_packet(&mesh, true) else { return };

@@ -9,44 +9,79 @@ use super::bits::Part;
 use super::range_coder::BitCoder;
 use super::symbols::IntModel;
 
-/// A colour in quantisation steps: R, G, B.
-pub(super) type Steps = [i32; 3];
+/// A colour: R, G, B in grains.
+pub(super) type Grains = [i32; 3];
 
-/// Range of a channel in 8-bit levels. Wider than a picture's: clamping fitted colours to [0, 255] costs quality.
+/// A grain is this part of an 8-bit level; all steps are whole grains.
+pub(super) const GRAINS_A_LEVEL: i32 = 128;
+
+/// Range of a channel, in 8-bit levels. Wider than a picture's: clamping fitted colours to [0, 255] costs quality.
 const LEVELS: [i32; 2] = [-128, 383];
 
-/// Steps are counted in 1/16 of a level.
-const STEPS_A_LEVEL: i32 = 16;
+/// Octaves that a wedge's step may be finer or coarser than the slab's.
+const OCTAVES: [i32; 2] = [-3, 2];
 
-/// Quantisation steps of colours that a slab may have, in 1/16 of an 8-bit level.
-pub const COLOR_STEPS: std::ops::RangeInclusive<u8> = 1..=128;
-
-/// The quantisation step of a slab that has chosen none: 2 levels.
-#[cfg(feature = "encode")]
-pub(super) const DEFAULT_COLOR_STEP: u8 = 32;
-
-/// Range of a channel in steps of `step` sixteenths.
-fn step_range(step: u8) -> [i32; 2] {
-    LEVELS.map(|level| level * STEPS_A_LEVEL / i32::from(step.max(1)))
+/// How coarsely a slab's colours are quantised.
+///
+/// The squared error that a rounded colour adds grows with the volume it colours, what it costs does not. Both are best
+/// spent where each step costs all wedges the same error: steps go with the square root of the tets' density (the
+/// reverse of Gersho's rule for one density), in octaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ColorSteps {
+    /// The step of wedges of this size, in 1/16 of an 8-bit level: 1 to 128.
+    pub step: u8,
+    /// Binary logarithm of the product of the extents x, y and t that edges have around such a wedge, in 1/16 lattice
+    /// units: 0 to 69.
+    pub size: u8,
 }
 
-/// The colour in steps of `step` sixteenths of a level, clamped to the range of the format.
-#[cfg(feature = "encode")]
-pub(super) fn to_steps(color: Vec3, step: u8) -> Steps {
-    let [low, high] = step_range(step);
-    let scale = STEPS_A_LEVEL as f32 / f32::from(step.max(1));
-    color.to_array().map(|channel| ((channel * scale).round() as i32).clamp(low, high))
+impl Default for ColorSteps {
+    /// Two levels, whatever the size.
+    fn default() -> Self {
+        Self::even(2)
+    }
 }
 
-/// The colour in 8-bit levels. Exact: a small integer over 16.
-pub(super) fn from_steps(steps: Steps, step: u8) -> Vec3 {
-    Vec3::from_array(steps.map(|s| (s * i32::from(step)) as f32 / STEPS_A_LEVEL as f32))
+impl ColorSteps {
+    /// Least and greatest step.
+    pub(super) const STEPS: [u8; 2] = [1, 128];
+    /// Least and greatest size.
+    pub(super) const SIZES: [u8; 2] = [0, 69];
+
+    /// Steps of so many levels, 1 to 32, for wedges of all sizes: they are all small beside this one.
+    pub const fn even(levels: u8) -> Self {
+        Self { step: levels.saturating_mul(4), size: Self::SIZES[1] }
+    }
+
+    /// Whether both numbers are in range.
+    pub(super) fn is_valid(self) -> bool {
+        let [low, high] = Self::STEPS;
+        (low..=high).contains(&self.step) && self.size <= Self::SIZES[1]
+    }
+
+    /// Octaves that wedges of a size differ in their step from the slab's.
+    pub(crate) fn octaves(self, size: i32) -> i32 {
+        let [low, high] = OCTAVES;
+        ((i32::from(self.size) - size) >> 1).clamp(low, high)
+    }
+
+    /// The step of wedges of a size, in grains.
+    pub(super) fn at(self, size: i32) -> i32 {
+        i32::from(self.step) << (self.octaves(size) - OCTAVES[0])
+    }
 }
 
-/// What a colour (8-bit levels) will be after the stream, with a slab's `color_step`.
+/// The multiple of `step` next to a colour in levels, within the range of the format.
 #[cfg(feature = "encode")]
-pub fn quantize_color(color: Vec3, color_step: u8) -> Vec3 {
-    from_steps(to_steps(color, color_step), color_step)
+pub(super) fn to_grains(color: Vec3, step: i32) -> Grains {
+    let [low, high] = LEVELS.map(|level| level * GRAINS_A_LEVEL / step);
+    let scale = GRAINS_A_LEVEL as f32 / step as f32;
+    color.to_array().map(|channel| ((channel * scale).round() as i32).clamp(low, high) * step)
+}
+
+/// The colour in 8-bit levels. Exact: a small integer over a power of two.
+pub(super) fn from_grains(color: Grains) -> Vec3 {
+    Vec3::from_array(color.map(|channel| channel as f32 / GRAINS_A_LEVEL as f32))
 }
 
 /// Classes of how uncertain a prediction is: the binary logarithm of a variance, then one for a single wedge known and
@@ -60,11 +95,11 @@ const LEARNT_MAX: i64 = 255;
 /// Window of its averages, as a power of two.
 const SLOPE_SHIFT: u32 = 10;
 
-/// Magnitudes of a coded colour's residuals: green's, and the sum of the others'.
+/// Magnitudes of a coded colour's residuals in grains: green's, and the sum of the others'.
 pub(super) type Misses = [u16; 2];
 
 /// Green, red less green, blue less green: what is predicted.
-fn to_channels([red, green, blue]: Steps) -> [i64; 3] {
+fn to_channels([red, green, blue]: Grains) -> [i64; 3] {
     [green, red - green, blue - green].map(i64::from)
 }
 
@@ -79,9 +114,9 @@ pub(super) struct Around {
 
 impl Around {
     /// Takes a wedge in.
-    pub(super) fn add(&mut self, steps: Steps, misses: Misses) {
+    pub(super) fn add(&mut self, color: Grains, misses: Misses) {
         self.count += 1;
-        for (channel, value) in to_channels(steps).into_iter().enumerate() {
+        for (channel, value) in to_channels(color).into_iter().enumerate() {
             self.sum[channel] += value;
             self.squares[channel] += value * value;
         }
@@ -94,9 +129,9 @@ impl Around {
         self.count == 0
     }
 
-    /// The mean, rounded; 0 of nothing.
-    fn prediction(&self) -> [i64; 3] {
-        let n = self.count.max(1);
+    /// The mean in steps, rounded; 0 of nothing.
+    fn prediction(&self, step: i64) -> [i64; 3] {
+        let n = self.count.max(1) * step;
         self.sum.map(|sum| (2 * sum + n).div_euclid(2 * n))
     }
 
@@ -105,12 +140,13 @@ impl Around {
         self.count * self.squares[channel] - self.sum[channel] * self.sum[channel]
     }
 
-    /// Class of how uncertain the prediction is: how much the wedges around differ, and how badly they were predicted.
-    fn class(&self, variance: i64, misses: i64) -> usize {
+    /// Class of how uncertain the prediction is, in steps: how much the wedges around differ, and how badly they were
+    /// predicted.
+    fn class(&self, variance: i64, misses: i64, step: i64) -> usize {
         match self.count {
             0 => CLASSES - 2,
             1 => CLASSES - 1,
-            n => ((4 * (variance + misses * misses) / (n * n) + 1).ilog2() as usize).min(CLASSES - 3),
+            n => ((4 * (variance + misses * misses) / (n * n * step * step) + 1).ilog2() as usize).min(CLASSES - 3),
         }
     }
 }
@@ -158,7 +194,7 @@ impl ColorModels {
     };
 }
 
-/// Codes a wedge's colour. Returns it with the magnitudes of its residuals.
+/// Codes a wedge's colour, a multiple of `step` grains. Returns it with the magnitudes of its residuals.
 ///
 /// The residuals of the three channels still hang together, from clip to clip in another way, so what is left of red is
 /// predicted from green's, and of blue from both.
@@ -169,14 +205,15 @@ pub(super) fn code_color(
     coder: &mut impl BitCoder,
     models: &mut ColorModels,
     around: &Around,
-    step: u8,
-    truth: Steps,
-) -> Result<(Steps, Misses), MeshFault> {
-    let predicted = around.prediction();
-    let truth = to_channels(truth);
+    step: i32,
+    truth: Grains,
+) -> Result<(Grains, Misses), MeshFault> {
+    let step = i64::from(step);
+    let predicted = around.prediction(step);
+    let truth = to_channels(truth).map(|channel| channel / step);
     let residual = [0, 1, 2].map(|channel| truth[channel] - predicted[channel]);
     let [luma, chroma] = [(around.variance(0), 0), (around.variance(1) + around.variance(2), 1)]
-        .map(|(v, m)| around.class(v, around.misses[m]));
+        .map(|(v, m)| around.class(v, around.misses[m], step));
 
     coder.enter(Part::Luma);
     let green = code_residual(coder, &mut models.green[luma], residual[0]);
@@ -193,13 +230,13 @@ pub(super) fn code_color(
 
     let found = predicted[0] + green;
     let found = [found + predicted[1] + along + red, found, found + predicted[2] + along_green + along_red + blue];
-    let [low, high] = step_range(step).map(i64::from);
+    let [low, high] = LEVELS.map(|level| i64::from(level * GRAINS_A_LEVEL) / step);
     if let Some(found) = found.into_iter().find(|channel| !(low..=high).contains(channel)) {
         return Err(MeshFault::Range { field: "color", low, high, found });
     }
-    let miss = |residual: u64| residual.min(u16::MAX.into()) as u16;
+    let miss = |residual: u64| (residual * step.unsigned_abs()).min(u16::MAX.into()) as u16;
     let misses = [miss(green.unsigned_abs()), miss(red.unsigned_abs() + blue.unsigned_abs())];
-    Ok((found.map(|channel| channel as i32), misses))
+    Ok((found.map(|channel| (channel * step) as i32), misses))
 }
 
 /// Codes a residual; the parser's `truth` is not looked at, and may be anything.
@@ -214,15 +251,25 @@ mod tests {
 
     #[test]
     fn quantisation_is_idempotent_and_clamps() {
-        for step in [1, 3, 16, 48, 128] {
+        for step in [1, 3, 16, 128, 4096] {
             for level in [-1000.0, -128.0, -0.3, 0.0, 7.77, 128.0, 255.0, 382.9, 1e9, f32::NAN] {
-                let once = quantize_color(Vec3::splat(level), step);
-                assert_eq!(quantize_color(once, step), once);
-                assert!((-128.0..=383.0).contains(&once.x));
+                let once = to_grains(Vec3::splat(level), step);
+                assert_eq!(to_grains(from_grains(once), step), once);
+                let back = from_grains(once).x;
+                assert!((-128.0..=383.0).contains(&back));
                 if (0.0..=255.0).contains(&level) {
-                    assert!((once.x - level).abs() <= f32::from(step) / 32.0 + 1e-4);
+                    assert!((back - level).abs() <= step as f32 / 256.0 + 1e-4);
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_quarter_of_the_size_has_twice_the_step() {
+        let steps = ColorSteps { step: 16, size: 20 };
+        // A level is 128 grains.
+        assert_eq!([20, 21, 22, 19, 18].map(|size| steps.at(size)), [128, 64, 64, 128, 256]);
+        assert_eq!([0, 69].map(|size| steps.at(size)), [512, 16]);
+        assert_eq!([0, 60].map(|size| ColorSteps::even(3).at(size)), [384; 2]);
     }
 }

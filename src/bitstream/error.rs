@@ -2,6 +2,9 @@
 
 use thiserror::Error;
 
+#[cfg(feature = "encode")]
+use super::colors::ColorSteps;
+
 /// A mesh that no slab may have. Found in bytes it means damage; found while writing, a fault of the caller's mesh.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum MeshFault {
@@ -170,11 +173,11 @@ pub enum WriteError {
     /// The sequence header is one that no parser would accept.
     #[error("sequence header: {0}")]
     Header(#[source] ParseError),
-    /// The colours' step is out of its range, or set after the first packet.
-    #[error("color step: expected 1 to 128 before the first packet, found {found}")]
-    ColorStep {
-        /// The step.
-        found: u8,
+    /// The colours' steps are out of their range, or set after the first packet.
+    #[error("color steps: expected a step of 1 to 128 and a size up to 63 before the first packet, found {found:?}")]
+    ColorSteps {
+        /// The steps.
+        found: ColorSteps,
     },
     /// The mesh's box or lattice is not the header's.
     #[error("domain: expected {expected:?}, found {found:?}")]

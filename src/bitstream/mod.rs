@@ -28,12 +28,12 @@ mod symbols;
 mod writer;
 
 pub use bits::{BitCounts, Part};
-pub use colors::COLOR_STEPS;
-#[cfg(feature = "encode")]
-pub use colors::quantize_color;
+pub use colors::ColorSteps;
 #[cfg(feature = "encode")]
 pub use error::WriteError;
 pub use error::{MeshFault, ParseError};
+#[cfg(feature = "encode")]
+pub(crate) use extents::{PARTS as EXTENT_PARTS, size_of};
 pub use framing::{
     MAGIC, PacketHeader, SEQUENCE_HEADER_BYTES, SYNC, VERSION, find_packet, parse_packet_header, parse_sequence_header,
 };

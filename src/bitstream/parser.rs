@@ -6,7 +6,7 @@
 use glam::IVec3;
 
 use super::bits::Tally;
-use super::colors::{COLOR_STEPS, Steps};
+use super::colors::{ColorSteps, Grains};
 use super::connectivity::Apex;
 use super::framing::{PacketHeader, parse_packet, read_u16, read_u32};
 use super::header::check_field;
@@ -138,10 +138,10 @@ impl SlabParser {
         }
     }
 
-    /// Quantisation step of the current slab's colours, in 1/16 of an 8-bit level; unknown after damage.
-    pub fn color_step(&self) -> Option<u8> {
+    /// How coarse the current slab's colours are; unknown after damage.
+    pub fn color_steps(&self) -> Option<ColorSteps> {
         match &self.state {
-            State::Open(open) => Some(open.slab.color_step()),
+            State::Open(open) => Some(open.slab.color_steps()),
             State::Empty | State::Broken(_) => None,
         }
     }
@@ -193,10 +193,13 @@ impl OpenSlab {
             return Err(length(2));
         }
         let header_end = 2 + usize::from(read_u16(body, 0));
-        let Some(&color_step) = body.get(header_end) else { return Err(length(header_end + 1)) };
+        let Some(&[step, size]) = body.get(header_end..header_end + 2) else { return Err(length(header_end + 2)) };
         let header = SequenceHeader::from_bytes(&body[2..header_end], &limits)?;
-        let steps = u64::from(*COLOR_STEPS.start())..=u64::from(*COLOR_STEPS.end());
-        check_field("color step", color_step.into(), steps)?;
+        for (field, found, [low, high]) in
+            [("color step", step, ColorSteps::STEPS), ("color size", size, ColorSteps::SIZES)]
+        {
+            check_field(field, found.into(), low.into()..=high.into())?;
+        }
         let slab = Slab::new(SlabParams {
             domain: Domain {
                 width: header.width,
@@ -205,11 +208,11 @@ impl OpenSlab {
                 subpixel_bits: header.subpixel_bits,
             },
             max_duration: header.max_duration(&limits),
-            color_step,
+            color_steps: ColorSteps { step, size },
             limits,
         });
         let open = Self { header, first_frame: packet.frame_number, packets: 0, ended: false, slab };
-        Ok((open, &body[header_end + 1..]))
+        Ok((open, &body[header_end + 2..]))
     }
 
     /// Parses the part of the body that every packet of a slab has.
@@ -296,7 +299,7 @@ impl Side for Parsing<'_> {
 
     fn wedge_made(&mut self, _: VertexId) {}
 
-    fn color(&self, _: usize) -> Steps {
+    fn color(&self, _: usize, _: i32) -> Grains {
         [0; 3]
     }
 

@@ -11,7 +11,7 @@ mod wedges;
 use glam::IVec3;
 
 use super::bits::Part;
-use super::colors::{ColorModels, Misses, Steps};
+use super::colors::{ColorModels, ColorSteps, Grains, Misses};
 use super::connectivity::{Apex, ConnectivityModels, Fan, Gate, choose_gate, code_apex, code_vertex_id};
 use super::extents::{Extents, PARTS};
 use super::front::{Front, unit_normal};
@@ -43,8 +43,8 @@ pub(super) trait Side: BitCoder {
     fn label(&mut self, count: u32) -> u32;
     /// The current tet has a new wedge at the coded vertex `vertex`.
     fn wedge_made(&mut self, vertex: VertexId);
-    /// Colour of a coded wedge.
-    fn color(&self, wedge: usize) -> Steps;
+    /// Colour of a coded wedge, a multiple of `step` grains.
+    fn color(&self, wedge: usize, step: i32) -> Grains;
     /// The current tet is complete and has the next number.
     fn tet_coded(&mut self);
     /// Whether the payload still holds what was read.
@@ -72,11 +72,11 @@ struct Models {
 pub(super) struct Slab {
     /// What is coded, its duration provisional until the end of the slab is known: the least that exceeds all t.
     mesh: TetMesh,
-    /// Colours of `mesh.wedges` in steps.
-    steps: Vec<Steps>,
+    /// Colours of `mesh.wedges`.
+    colors: Vec<Grains>,
     /// How far off their predictions were.
     misses: Vec<Misses>,
-    color_step: u8,
+    color_steps: ColorSteps,
     bounds: Bounds,
     /// Longest duration allowed, in frames.
     max_duration: u32,
@@ -116,8 +116,8 @@ pub(super) struct SlabParams {
     pub(super) domain: Domain,
     /// Longest duration allowed, in frames.
     pub(super) max_duration: u32,
-    /// Quantisation step of colours, in 1/16 of a level.
-    pub(super) color_step: u8,
+    /// How coarse colours are.
+    pub(super) color_steps: ColorSteps,
     /// Bounds on counts.
     pub(super) limits: Limits,
 }
@@ -127,9 +127,9 @@ impl Slab {
         let domain = Domain { duration: 1, ..params.domain };
         Self {
             mesh: TetMesh::empty(domain),
-            steps: Vec::new(),
+            colors: Vec::new(),
             misses: Vec::new(),
-            color_step: params.color_step,
+            color_steps: params.color_steps,
             bounds: Bounds { domain, top_known: false },
             max_duration: params.max_duration,
             limits: params.limits,
@@ -155,9 +155,9 @@ impl Slab {
         }
     }
 
-    /// Quantisation step of colours, in 1/16 of a level.
-    pub(super) fn color_step(&self) -> u8 {
-        self.color_step
+    /// How coarse colours are.
+    pub(super) fn color_steps(&self) -> ColorSteps {
+        self.color_steps
     }
 
     /// What is coded so far.

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use glam::IVec3;
 
-use super::colors::{Steps, to_steps};
+use super::colors::{Grains, to_grains};
 use super::connectivity::Apex;
 use super::range_coder::{BitCoder, BitModel, RangeEncoder};
 use super::slab::Side;
@@ -133,7 +133,6 @@ fn check_tet(mesh: &TetMesh, tet: usize) -> Result<(), MeshError> {
 pub(super) struct Writing<'a> {
     source: &'a mut Source,
     mesh: &'a TetMesh,
-    color_step: u8,
     /// Vertices before this t are low.
     low_until: i32,
     encoder: RangeEncoder,
@@ -146,9 +145,9 @@ pub(super) struct Writing<'a> {
 }
 
 impl<'a> Writing<'a> {
-    pub(super) fn new(source: &'a mut Source, mesh: &'a TetMesh, color_step: u8, low_until: i32) -> Self {
+    pub(super) fn new(source: &'a mut Source, mesh: &'a TetMesh, low_until: i32) -> Self {
         let encoder = RangeEncoder::new();
-        Self { source, mesh, color_step, low_until, encoder, tet: 0, vertex: VertexId(0), seeds_from: 0 }
+        Self { source, mesh, low_until, encoder, tet: 0, vertex: VertexId(0), seeds_from: 0 }
     }
 
     /// The payload.
@@ -228,9 +227,9 @@ impl Side for Writing<'_> {
         self.source.source_wedge.push(wedge);
     }
 
-    fn color(&self, wedge: usize) -> Steps {
+    fn color(&self, wedge: usize, step: i32) -> Grains {
         let wedge = self.source.source_wedge[wedge];
-        to_steps(self.mesh.wedges[wedge.index()].color, self.color_step)
+        to_grains(self.mesh.wedges[wedge.index()].color, step)
     }
 
     fn tet_coded(&mut self) {

@@ -3,7 +3,7 @@
 //! In: the slab's committed mesh, once a packet. Out: packets, one a frame. Forbidden here: choosing keyframes, or
 //! changing the mesh.
 
-use super::colors::{COLOR_STEPS, DEFAULT_COLOR_STEP};
+use super::colors::ColorSteps;
 use super::framing::{PacketHeader, write_packet};
 use super::slab::{Slab, SlabParams};
 use super::source::{Source, Writing};
@@ -15,7 +15,7 @@ use crate::mesh::{Domain, TetMesh};
 pub struct SlabWriter {
     header: SequenceHeader,
     first_frame: u64,
-    color_step: u8,
+    color_steps: ColorSteps,
     packets: u32,
     ended: bool,
     source: Source,
@@ -33,7 +33,7 @@ impl SlabWriter {
         Ok(Self {
             header,
             first_frame,
-            color_step: DEFAULT_COLOR_STEP,
+            color_steps: ColorSteps::default(),
             packets: 0,
             ended: false,
             source: Source::new(),
@@ -41,15 +41,15 @@ impl SlabWriter {
         })
     }
 
-    /// Quantises the slab's colours in steps of so many sixteenths of a level; without, in steps of two levels.
+    /// Quantises the slab's colours this coarsely; without, in steps of two levels.
     ///
     /// # Errors
-    /// A step out of [`COLOR_STEPS`], or one that comes after the first packet.
-    pub fn set_color_step(&mut self, color_step: u8) -> Result<(), WriteError> {
-        if self.slab.is_some() || !COLOR_STEPS.contains(&color_step) {
-            return Err(WriteError::ColorStep { found: color_step });
+    /// Numbers out of range, or after the first packet.
+    pub fn set_color_steps(&mut self, color_steps: ColorSteps) -> Result<(), WriteError> {
+        if self.slab.is_some() || !color_steps.is_valid() {
+            return Err(WriteError::ColorSteps { found: color_steps });
         }
-        self.color_step = color_step;
+        self.color_steps = color_steps;
         Ok(())
     }
 
@@ -73,14 +73,14 @@ impl SlabWriter {
             let header = self.header.to_bytes();
             body.extend_from_slice(&(header.len() as u16).to_le_bytes());
             body.extend_from_slice(&header);
-            body.push(self.color_step);
+            body.extend([self.color_steps.step, self.color_steps.size]);
         }
         let header = self.header;
         let slab = self.slab.get_or_insert_with(|| {
             Slab::new(SlabParams {
                 domain: mesh.domain,
                 max_duration: header.max_duration(&Limits::default()),
-                color_step: self.color_step,
+                color_steps: self.color_steps,
                 limits: Limits::default(),
             })
         });
@@ -92,7 +92,7 @@ impl SlabWriter {
         } else {
             (self.packets + 1, (self.packets as i32 + 1).saturating_mul(mesh.domain.unit()))
         };
-        let mut side = Writing::new(&mut self.source, mesh, self.color_step, low_until);
+        let mut side = Writing::new(&mut self.source, mesh, low_until);
         slab.code_packet(&mut side, low_frames)?;
         body.extend_from_slice(&side.finish());
         self.source.sweep();

@@ -7,11 +7,11 @@ use std::sync::Arc;
 
 use super::observer::{Event, Observer, Stage};
 use super::proof::Proof;
-use super::quantize::{color_step, rounded_rms};
+use super::quantize::{color_steps, rounded_rms};
 use super::readiness::{FAR, hops};
 use super::runs::{Run, Runs};
 use super::{EncodeError, EncoderConfig, ErrorMetric};
-use crate::bitstream::{Packet, RINGS, SlabWriter, quantize_color};
+use crate::bitstream::{Packet, RINGS, SlabWriter};
 use crate::mesh::{Domain, StarTable, TetMesh};
 use crate::vectorize::fit::{FitParams, FitReport, FitRequest, fit};
 use crate::vectorize::lattice::AdaptiveLattice;
@@ -111,8 +111,8 @@ pub(super) struct SlabEncoder<Q> {
     work: WorkMesh<Q>,
     committed: TetMesh,
     writer: SlabWriter,
-    /// Step of colours in sixteenths of a level, once it is chosen.
-    color_step: Option<u8>,
+    /// Whether the steps of colours are chosen: the slab's first fit decides.
+    colors_measured: bool,
     runs: Runs,
     /// Frames that the fit may still need, and their labels.
     volume: Volume,
@@ -155,8 +155,6 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             },
             fit_params: FitParams {
                 subdivision_levels: config.subdivision_levels,
-                // As good as none: how coarse colours may be follows from the error that they leave.
-                color_step: 1,
                 position_iterations: config.position_steps,
                 // Where only colours are fitted, nothing fits between the centres.
                 quarter_weight: if config.position_steps == 0 { 0.0 } else { FitParams::default().quarter_weight },
@@ -165,7 +163,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             work: WorkMesh::new(domain),
             committed: TetMesh::empty(domain),
             writer: SlabWriter::try_new(header, first_frame)?,
-            color_step: None,
+            colors_measured: false,
             runs: Runs::new(domain, config),
             volume: Volume::new(0),
             labels: VecDeque::new(),
@@ -343,7 +341,11 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let free = self.unsent(stars);
         let source = Source { frames: &self.volume, labels: self.labels.make_contiguous() };
         let mut total = fit_in_parts(&mut self.committed, &free, source, &self.fit_params)?;
-        self.quantize_colors(&mut total)?;
+        if !self.colors_measured {
+            self.colors_measured = true;
+            self.writer.set_color_steps(color_steps(&self.committed, total.rms_within_tets))?;
+        }
+        total.rms_after = rounded_rms(total.rms_after, total.rms_within_tets);
         Ok(total)
     }
 
@@ -355,23 +357,6 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         if let Some(reached) = self.proof.compare(mesh, frames)?.filter(|&reached| reached > 0.0) {
             self.error_gain *= (self.target_error / reached).powi(2).clamp(0.5, 2.0);
         }
-        Ok(())
-    }
-
-    /// Rounds colours as the stream will; the slab's first fit decides how coarsely.
-    fn quantize_colors(&mut self, report: &mut FitReport) -> Result<(), EncodeError> {
-        let step = match self.color_step {
-            Some(step) => step,
-            None => {
-                let step = color_step(report.rms_within_tets);
-                self.writer.set_color_step(step)?;
-                *self.color_step.insert(step)
-            }
-        };
-        for wedge in &mut self.committed.wedges {
-            wedge.color = quantize_color(wedge.color, step);
-        }
-        report.rms_after = rounded_rms(report.rms_after, step);
         Ok(())
     }
 

@@ -170,8 +170,8 @@ class Slope:
 
 
 class Slab:
-    def __init__(self, header):
-        self.header = header
+    def __init__(self, header, step, size):
+        self.header, self.step, self.size = header, step, size
         self.unit = 1 << header["subpixel_bits"]
         self.duration = None
         self.models = Models()
@@ -486,11 +486,12 @@ class Slab:
         channels = [[(g, r - g, b - g)[i] for (r, g, b), _ in known] for i in range(3)]
         sums = [sum(values) for values in channels]
         variance = [n * sum(x * x for x in values) - s * s for values, s in zip(channels, sums)]
-        prediction = [(2 * s + n) // (2 * n) if n else 0 for s in sums]
+        step = self.step_of(self.wedges[wedge][0])
+        prediction = [(2 * s + n * step) // (2 * n * step) if n else 0 for s in sums]
         missed = [sum(misses[i] for _, misses in known) for i in range(2)]
 
         def class_of(v, m):
-            return 16 + n if n < 2 else min(15, log2(4 * (v + m * m) // (n * n) + 1))
+            return 16 + n if n < 2 else min(15, log2(4 * (v + m * m) // (n * n * step * step) + 1))
 
         a, c = class_of(variance[0], missed[0]), class_of(variance[1] + variance[2], missed[1])
         rg, bg, br = (self.slopes[name] for name in ("rg", "bg", "br"))
@@ -504,8 +505,14 @@ class Slab:
         bg.learn(green, along3 + along2 + blue)
         br.learn(red, along2 + blue)
         g = prediction[0] + green
-        self.colors.append((g + prediction[1] + along + red, g, g + prediction[2] + along3 + along2 + blue))
-        self.misses.append((min(abs(green), 65535), min(abs(red) + abs(blue), 65535)))
+        color = (g + prediction[1] + along + red, g, g + prediction[2] + along3 + along2 + blue)
+        self.colors.append(tuple(channel * step for channel in color))
+        self.misses.append((min(abs(green) * step, 65535), min((abs(red) + abs(blue)) * step, 65535)))
+
+    def step_of(self, vertex):
+        x, y, t = (max(extent, 1) for extent in self.extents[vertex])
+        octaves = (self.size - log2(x * y * t)) // 2
+        return self.step << min(max(octaves, -3), 2) + 3
 
     # Section 8: vertices
 
@@ -591,8 +598,8 @@ def parse_header(data):
 def packets(stream):
     at = 0
     while at < len(stream):
-        keyframe = stream[at : at + 8] == b"\x89TETV\r\n\x02"
-        assert keyframe or stream[at : at + 4] == b"\x89TVP", "a start code of version 2"
+        keyframe = stream[at : at + 8] == b"\x89TETV\r\n\x03"
+        assert keyframe or stream[at : at + 4] == b"\x89TVP", "a start code of version 3"
         start = at + (8 if keyframe else 4)
         flags, length, frame, check = struct.unpack_from("<BIQH", stream, start)
         packet = stream[at : at + length]
@@ -610,9 +617,10 @@ def parse(stream):
             continue
         if flags & 1:
             (length,) = struct.unpack_from("<H", body)
-            slab = Slab(parse_header(body[2 : 2 + length]))
-            assert 1 <= body[2 + length] <= 128, "a colour step in range"
-            body = body[3 + length :]
+            step, size = body[2 + length : 4 + length]
+            assert 1 <= step <= 128 and size <= 69, "colour steps in range"
+            slab = Slab(parse_header(body[2 : 2 + length]), step, size)
+            body = body[4 + length :]
         if flags & 2:
             slab.end_at(struct.unpack_from("<I", body)[0])
             body = body[4:]

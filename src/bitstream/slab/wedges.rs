@@ -5,7 +5,7 @@
 use crate::bitstream::MeshFault;
 use glam::Vec3;
 
-use crate::bitstream::colors::{Around, code_color, from_steps};
+use crate::bitstream::colors::{Around, code_color, from_grains};
 use crate::bitstream::labels::{LabelContext, code_label};
 use crate::mesh::{VertexId, Wedge, WedgeId};
 use crate::video::Label;
@@ -119,13 +119,14 @@ impl Slab {
 
     /// Codes the colours of all wedges that have none yet.
     pub(super) fn code_colors(&mut self, side: &mut impl Side) -> Result<(), MeshFault> {
-        for wedge in self.steps.len()..self.mesh.wedges.len() {
+        for wedge in self.colors.len()..self.mesh.wedges.len() {
             side.check()?;
             let around = self.around(wedge);
-            let truth = side.color(wedge);
-            let (steps, misses) = code_color(side, &mut self.models.colors, &around, self.color_step, truth)?;
-            self.mesh.wedges[wedge].color = from_steps(steps, self.color_step);
-            self.steps.push(steps);
+            let step = self.color_steps.at(self.extents.size(self.mesh.wedges[wedge].vertex));
+            let truth = side.color(wedge, step);
+            let (color, misses) = code_color(side, &mut self.models.colors, &around, step, truth)?;
+            self.mesh.wedges[wedge].color = from_grains(color);
+            self.colors.push(color);
             self.misses.push(misses);
         }
         Ok(())
@@ -139,12 +140,12 @@ impl Slab {
             let wedges = self.mesh.tets[tet as usize];
             if wedges.iter().any(|w| w.index() == wedge) {
                 for other in wedges.into_iter().filter(|w| w.index() < wedge) {
-                    around.add(self.steps[other.index()], self.misses[other.index()]);
+                    around.add(self.colors[other.index()], self.misses[other.index()]);
                 }
             }
         }
         if around.is_empty() && wedge > 0 {
-            around.add(self.steps[wedge - 1], [0; 2]);
+            around.add(self.colors[wedge - 1], [0; 2]);
         }
         around
     }

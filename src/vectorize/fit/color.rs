@@ -48,15 +48,6 @@ impl Colors {
             }
         }
     }
-
-    /// Rounds colours that may change to multiples of `step` sixteenths of a level.
-    pub(super) fn quantize(&mut self, step: u8) {
-        let step = f32::from(step) / 16.0;
-        let limit = COLOR_RANGE.map(|limit| (limit / step).trunc());
-        for (now, _) in self.now.iter_mut().zip(&self.mask).filter(|(_, mask)| mask.x > 0.0) {
-            *now = (*now / step).round().clamp(Vec3::splat(limit[0]), Vec3::splat(limit[1])) * step;
-        }
-    }
 }
 
 fn clamp(color: Vec3) -> Vec3 {

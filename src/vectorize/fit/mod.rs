@@ -171,7 +171,6 @@ impl<'a> Fitting<'a> {
     fn final_colors(&mut self) {
         let evidence = self.gather();
         self.colors.optimize(&self.model, &evidence, self.params.color_iterations, self.params);
-        self.colors.quantize(self.params.color_step);
         self.report.rms_after = self.rms(&evidence);
         self.report.rms_within_tets = evidence.error_within_tets(&self.model, &self.colors.now);
     }

@@ -14,8 +14,6 @@ pub const COLOR_RANGE: [f32; 2] = [-128.0, 383.0];
 pub struct FitParams {
     /// Levels of subdivision to fit through: those that will be shown, 0 to 2.
     pub subdivision_levels: u8,
-    /// Colours end as multiples of this, in sixteenths of a level; at least 1.
-    pub color_step: u8,
 
     /// The paper's lambda (Eq. 7): what a change of Laplacian coordinates costs beside a distance to the boundary.
     pub laplacian_weight: f32,
@@ -58,7 +56,6 @@ impl Default for FitParams {
     fn default() -> Self {
         Self {
             subdivision_levels: 1,
-            color_step: 16,
             laplacian_weight: 1.0,
             surface_iterations: 5,
             surface_cg_iterations: 50,
@@ -80,7 +77,6 @@ impl Default for FitParams {
 impl FitParams {
     fn check(&self) -> Result<(), FitError> {
         expect("subdivision_levels", "0 to 2", self.subdivision_levels, (0..=2).contains(&self.subdivision_levels))?;
-        expect("color_step", "at least 1", self.color_step, self.color_step >= 1)?;
         let not_negative = [
             ("laplacian_weight", self.laplacian_weight),
             ("surface_reach_px", self.surface_reach_px),
