@@ -5,6 +5,7 @@
 //! zoom, nearest      | zoom, Lanczos          | zoom, drawn at its size | control mesh there
 //! ```
 
+mod command;
 #[path = "figure/panels.rs"]
 mod panels;
 #[path = "figure/section.rs"]
@@ -59,13 +60,7 @@ struct Arguments {
 const PANEL_WIDTH: u32 = 320;
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("figure: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    command::run("figure", run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {

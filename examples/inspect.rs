@@ -3,6 +3,8 @@
 //! Prints a row a stream: vertices, tets and wedges a vertex, bytes a vertex, bits a tet of connectivity, and bits a
 //! vertex of each part.
 
+mod command;
+
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -19,13 +21,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("inspect: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    command::run("inspect", run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {

@@ -6,6 +6,7 @@
 
 #[path = "measure/clock.rs"]
 mod clock;
+mod command;
 #[path = "vectorize/settings.rs"]
 mod settings;
 #[path = "vectorize/source.rs"]
@@ -38,13 +39,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("measure: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    command::run("measure", run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {

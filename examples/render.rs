@@ -4,6 +4,7 @@
 //! Files written one behind the other (`cat a.tetv b.tetv`) are numbered through. Damaged packets are reported, and
 //! drawing goes on at the next keyframe.
 
+mod command;
 #[path = "render/stream.rs"]
 mod stream;
 #[path = "render/times.rs"]
@@ -55,13 +56,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("render: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    command::run("render", run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {

@@ -5,6 +5,7 @@
 //! row). Prints the figures of `segment`'s own metrics and the time it took. `scripts/compare_superpixels.py` sets the
 //! labels beside those of other methods.
 
+mod command;
 #[path = "vectorize/source.rs"]
 mod source;
 
@@ -44,13 +45,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("superpixels: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    command::run("superpixels", run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {

@@ -2,6 +2,7 @@
 //!
 //! Any video becomes y4m with `ffmpeg -i in.mp4 -pix_fmt yuv420p in.y4m`.
 
+mod command;
 #[path = "vectorize/settings.rs"]
 mod settings;
 #[path = "vectorize/source.rs"]
@@ -33,13 +34,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("vectorize: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    command::run("vectorize", run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {

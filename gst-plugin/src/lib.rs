@@ -12,6 +12,11 @@ mod enc;
 mod parse;
 mod typefind;
 
+/// Keeps memory level over long clips (docs/benchmarks.md); what GStreamer allocates is not its business.
+#[cfg(not(target_env = "msvc"))]
+#[global_allocator]
+static ALLOCATOR: tikv_jemallocator::Jemalloc = tikv_jemallocator::Jemalloc;
+
 /// Most worker threads that an element can be told to start: a slip of the keyboard must not start thousands.
 const MAX_THREADS: u32 = 1024;
 
