@@ -4,6 +4,7 @@
 //! floating point, and any order that depends on more than the order of calls.
 
 use glam::IVec3;
+use wide::i32x4;
 
 use super::vertices::Vertices;
 use crate::mesh::VertexId;
@@ -14,15 +15,23 @@ pub(super) const PARTS: i32 = 16;
 /// Takes a tet into the running means of the extents of the edges at its corners, in 1/16 lattice units; they are 0
 /// before the first.
 pub(super) fn learn(vertices: &mut Vertices, corners: [VertexId; 4], positions: [IVec3; 4]) {
-    let [a, b, c, d] = positions;
+    let [a, b, c, d] = positions.map(lanes);
     let [ab, ac, ad] = [(b - a).abs(), (c - a).abs(), (d - a).abs()];
     let [bc, bd, cd] = [(c - b).abs(), (d - b).abs(), (d - c).abs()];
     let around = [ab + ac + ad, ab + bc + bd, ac + bc + cd, ad + bd + cd];
     for (vertex, sum) in corners.into_iter().zip(around) {
-        let here = sum * PARTS / 3;
+        // A third, exact for what is not negative.
+        let here = (sum * i32x4::splat(PARTS)).mul_keep_high(i32x4::splat(0x5555_5556));
         let mean = &mut vertices[vertex].extent;
-        *mean = if *mean == IVec3::ZERO { here } else { *mean + ((here - *mean) >> 2) };
+        let known = lanes(*mean);
+        let next = if *mean == IVec3::ZERO { here } else { known + ((here - known) >> 2) };
+        let [x, y, t, _] = next.to_array();
+        *mean = IVec3::new(x, y, t);
     }
+}
+
+fn lanes(v: IVec3) -> i32x4 {
+    i32x4::new([v.x, v.y, v.z, 0])
 }
 
 /// The sum over three vertices, at least that of a lattice unit.

@@ -185,7 +185,11 @@ impl Fan {
         let youngest = self.live.checked_ilog2()? as usize;
         self.refresh(vertices);
         let (mut slot, mut best) = (youngest, f64::NEG_INFINITY);
-        for (other, &cos) in self.cosines[..=youngest].iter().enumerate() {
+        let mut left = self.live;
+        while left != 0 {
+            let other = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let cos = self.cosines[other];
             (slot, best) = if cos >= best { (other, cos) } else { (slot, best) };
         }
         if best == f64::NEG_INFINITY {

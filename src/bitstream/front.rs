@@ -7,11 +7,10 @@ mod lists;
 
 use glam::{DVec3, I64Vec3, IVec3};
 
-use super::MeshFault;
 use super::vertices::Vertices;
 use crate::mesh::VertexId;
 use lists::Lists;
-pub(super) use lists::{Lanes, List, ROOM, Spoke, equal_lanes};
+pub(super) use lists::{Lanes, List, Met, ROOM, Spoke, equal_lanes};
 
 /// A face with a coded tet on one side only. A line of the cache.
 #[derive(Debug, Clone)]
@@ -57,11 +56,6 @@ pub(super) struct Front {
     lists: Lists,
 }
 
-/// The same cyclic order, starting at each of the corners.
-fn turns([a, b, c]: [VertexId; 3]) -> [[VertexId; 3]; 3] {
-    [[a, b, c], [b, c, a], [c, a, b]]
-}
-
 impl Front {
     pub(super) fn new() -> Self {
         Self { faces: Vec::new(), free: Vec::new(), lists: Lists::new() }
@@ -99,17 +93,18 @@ impl Front {
         Some((spoke.face, if back { spoke.second } else { spoke.third }))
     }
 
-    /// The open face that a new tet's face with these corners (seen from outside the new tet) closes.
-    pub(super) fn facing(&self, vertices: &Vertices, [a, b, c]: [VertexId; 3]) -> Option<u32> {
-        self.find(vertices, [a, c, b])
-    }
-
-    /// The open face with these corners in this cyclic order. It is looked for where there are fewest.
-    fn find(&self, vertices: &Vertices, corners: [VertexId; 3]) -> Option<u32> {
-        let [a, b, c] = turns(corners).map(|turned| (vertices[turned[0]].list, turned));
-        let fewer = |a: (List, _), b: (List, _)| if b.0.count() < a.0.count() { b } else { a };
-        let (list, turned) = fewer(fewer(a, b), c);
-        self.lists.find(list, turned)
+    /// What of a new tet's face with these corners (seen from outside the new tet) is open. It is looked for where there
+    /// are fewest.
+    pub(super) fn meet(&self, vertices: &Vertices, [a, b, c]: [VertexId; 3]) -> Met {
+        let [at_a, at_b, at_c] = [vertices[a].list, vertices[b].list, vertices[c].list];
+        let (mut list, mut corners) = (at_a, [a, b, c]);
+        if at_b.count() < list.count() {
+            (list, corners) = (at_b, [b, c, a]);
+        }
+        if at_c.count() < list.count() {
+            (list, corners) = (at_c, [c, a, b]);
+        }
+        self.lists.meet(list, corners)
     }
 
     /// Adds an open face of a tet with this unit normal. Returns its id.
@@ -119,20 +114,19 @@ impl Front {
         corners: [VertexId; 3],
         normal: DVec3,
         behind: CodedTet,
-    ) -> Result<u32, MeshFault> {
-        if self.find(vertices, corners).is_some() {
-            return Err(MeshFault::DuplicateFace { face: corners.map(|v| v.0) });
-        }
+    ) -> u32 {
+        let [a, b, c] = corners;
         let face = self.free.last().copied().unwrap_or(self.faces.len() as u32);
-        let blocks = turns(corners).map(|[vertex, second, third]| {
+        let mut list = |vertex: VertexId, second: VertexId, third: VertexId| {
             self.lists.push(vertex, &mut vertices[vertex].list, Spoke { face, second, third })
-        });
+        };
+        let blocks = [list(a, b, c), list(b, c, a), list(c, a, b)];
         let open = OpenFace { corners, behind, normal, blocks };
         match self.free.pop() {
             Some(face) => self.faces[face as usize] = open,
             None => self.faces.push(open),
         }
-        Ok(face)
+        face
     }
 
     /// Takes an open face out.
@@ -156,7 +150,7 @@ mod tests {
         (0..4).for_each(|_| vertices.push(IVec3::ZERO, 0));
         for corners in crate::mesh::FACES {
             let corners = corners.map(|c| VertexId(c as u32));
-            front.insert(&mut vertices, corners, DVec3::X, BEHIND).unwrap();
+            front.insert(&mut vertices, corners, DVec3::X, BEHIND);
         }
         (front, vertices)
     }
@@ -169,18 +163,20 @@ mod tests {
             assert!(front.at(&vertices, v).all(|spoke| front.face(spoke.face).corners.contains(&v)));
         }
         let outside = [3, 2, 1].map(VertexId);
-        let closed = front.facing(&vertices, outside).expect("its mirror image is open");
+        let closed = front.meet(&vertices, outside).mirrored.expect("its mirror image is open");
         front.remove(&mut vertices, closed);
-        assert_eq!(front.facing(&vertices, outside), None);
+        assert_eq!(front.meet(&vertices, outside), Met::NOTHING);
         let left: Vec<usize> = (0..4).map(|v| front.at(&vertices, VertexId(v)).count()).collect();
         assert_eq!(left, [3, 2, 2, 2]);
     }
 
     #[test]
-    fn a_face_is_open_once() {
-        let (mut front, mut vertices) = front_of_four();
-        let again = front.insert(&mut vertices, [2, 3, 1].map(VertexId), DVec3::X, BEHIND);
-        assert_eq!(again, Err(MeshFault::DuplicateFace { face: [2, 3, 1] }));
+    fn a_face_is_met_from_any_corner() {
+        let (front, vertices) = front_of_four();
+        for corners in [[1, 2, 3], [2, 3, 1], [3, 1, 2]] {
+            assert!(front.meet(&vertices, corners.map(VertexId)).is_there);
+        }
+        assert!(!front.meet(&vertices, [2, 1, 3].map(VertexId)).is_there);
     }
 
     #[test]

@@ -15,7 +15,7 @@ use super::colors::{ColorModels, KnownColor, Steps};
 use super::connectivity::{Apex, ConnectivityModels, Gate, choose_gate, code_apex, code_vertex_id};
 use super::extents::{self, PARTS};
 use super::fan::Fan;
-use super::front::{CodedTet, Front, plane, unit_normal};
+use super::front::{CodedTet, Front, Met, plane, unit_normal};
 use super::hops::{Hops, RINGS};
 use super::labels::LabelModels;
 use super::near::Rings;
@@ -413,14 +413,14 @@ impl Slab {
         let positions = corners.map(|v| self.vertices.position(v));
         self.check_positive(volume6(positions[0], positions[1], positions[2], positions[3]))?;
         let is_new = gate.is_some() && self.vertices[corners[3]].star.count == 0;
-        let facing = [0, 1, 2, 3].map(|face| match gate {
+        let met = [0, 1, 2, 3].map(|face| match gate {
             // The gate is face 3, opposite the apex; a new apex has no other open face.
-            Some(_) if face == 3 => gate,
-            Some(_) if is_new => None,
-            _ => self.front.facing(&self.vertices, FACES[face].map(|c| corners[c])),
+            Some(_) if face == 3 => Met { mirrored: gate, is_there: false },
+            Some(_) if is_new => Met::NOTHING,
+            _ => self.front.meet(&self.vertices, FACES[face].map(|c| corners[c])),
         });
         side.enter(Part::Labels);
-        let label = self.code_tet_label(side, corners, gate, facing)?;
+        let label = self.code_tet_label(side, corners, gate, met.map(|met| met.mirrored))?;
         let wedges = self.code_wedges(side, corners, label)?;
         self.mesh.tets.push(wedges);
         self.corners.push(corners);
@@ -429,20 +429,24 @@ impl Slab {
             self.stars.push(&mut self.vertices[vertex].star, tet);
         }
         extents::learn(&mut self.vertices, corners, positions);
-        for (lacking, (face, closed)) in FACES.into_iter().zip(facing).enumerate() {
-            if let Some(closed) = closed {
+        for (lacking, (face, met)) in FACES.into_iter().zip(met).enumerate() {
+            if let Some(closed) = met.mirrored {
                 self.close_face(closed);
                 continue;
             }
             let face_corners = face.map(|c| corners[c]);
-            if !self.is_walled(face_corners) {
-                let scale = extents::around(&self.vertices, face_corners).as_dvec3() / f64::from(3 * PARTS);
-                let plane = plane(face.map(|c| positions[c]));
-                let normal = unit_normal(plane, scale);
-                let behind = CodedTet { number: tet, label, opposite: corners[lacking] };
-                let opened = self.front.insert(&mut self.vertices, face_corners, normal, behind)?;
-                self.fan.open(face_corners, opened, normal, plane);
+            if self.is_walled(face_corners) {
+                continue;
             }
+            if met.is_there {
+                return Err(MeshFault::DuplicateFace { face: face_corners.map(|v| v.0) });
+            }
+            let scale = extents::around(&self.vertices, face_corners).as_dvec3() / f64::from(3 * PARTS);
+            let plane = plane(face.map(|c| positions[c]));
+            let normal = unit_normal(plane, scale);
+            let behind = CodedTet { number: tet, label, opposite: corners[lacking] };
+            let opened = self.front.insert(&mut self.vertices, face_corners, normal, behind);
+            self.fan.open(face_corners, opened, normal, plane);
         }
         side.tet_coded();
         Ok(())

@@ -100,6 +100,19 @@ impl List {
     }
 }
 
+/// What of a face is open already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::bitstream) struct Met {
+    /// The open face with the same corners seen from the other side: the one that the face closes.
+    pub(in crate::bitstream) mirrored: Option<u32>,
+    /// Whether there is an open face just like it.
+    pub(in crate::bitstream) is_there: bool,
+}
+
+impl Met {
+    pub(in crate::bitstream) const NOTHING: Self = Self { mirrored: None, is_there: false };
+}
+
 /// The bit of a count that says that the vertex is a hub.
 const IS_HUB: u32 = 1 << 31;
 
@@ -140,21 +153,26 @@ impl Lists {
         .flatten()
     }
 
-    /// The face at a vertex with these second and third corners.
+    /// What of a face and its mirror image is in the list of a vertex.
     #[inline]
-    pub(super) fn find(&self, list: List, [vertex, second, third]: [VertexId; 3]) -> Option<u32> {
+    pub(super) fn meet(&self, list: List, [vertex, second, third]: [VertexId; 3]) -> Met {
         if list.count & IS_HUB != 0 {
-            return self.at_hubs.get([vertex, second, third]).copied();
+            let find = |second, third| self.at_hubs.get([vertex, second, third]).copied();
+            return Met { mirrored: find(third, second), is_there: find(second, third).is_some() };
         }
+        let mut met = Met::NOTHING;
         let mut block = list.youngest;
         while let Some(found) = self.blocks.get(block as usize) {
-            let equal = equal_lanes(&found.seconds, second.0) & equal_lanes(&found.thirds, third.0) & found.live;
-            if equal != 0 {
-                return Some(found.faces[equal.trailing_zeros() as usize % ROOM]);
+            let seconds = [second, third].map(|v| equal_lanes(&found.seconds, v.0));
+            let thirds = [second, third].map(|v| equal_lanes(&found.thirds, v.0));
+            met.is_there |= seconds[0] & thirds[1] & found.live != 0;
+            let mirrored = seconds[1] & thirds[0] & found.live;
+            if mirrored != 0 {
+                met.mirrored = Some(found.faces[mirrored.trailing_zeros() as usize % ROOM]);
             }
             block = found.older;
         }
-        None
+        met
     }
 
     /// The youngest of the `scan` youngest faces of a list that has this vertex as its second or (`third`) its third corner.
@@ -288,14 +306,15 @@ mod tests {
             } else if !plain[vertex].is_empty() {
                 let (Spoke { face, second, third }, block) = plain[vertex].remove(random(plain[vertex].len()));
                 lists.remove(id, &mut heads[vertex], block, face);
-                assert_eq!(lists.find(heads[vertex], [id, second, third]), None);
+                assert_eq!(lists.meet(heads[vertex], [id, second, third]), Met::NOTHING);
             }
             assert_eq!(heads[vertex].count() as usize, plain[vertex].len());
             assert!(lists.at(heads[vertex]).eq(plain[vertex].iter().rev().map(|&(spoke, _)| spoke)));
             let across = |spoke: &Spoke| lists.find_across(heads[vertex], 24, true, spoke.third).is_some();
             assert!(plain[vertex].iter().rev().enumerate().all(|(age, (spoke, _))| across(spoke) == (age < 24)));
             if let Some((Spoke { face, second, third }, _)) = plain[vertex].first() {
-                assert_eq!(lists.find(heads[vertex], [id, *second, *third]), Some(*face));
+                assert!(lists.meet(heads[vertex], [id, *second, *third]).is_there);
+                assert_eq!(lists.meet(heads[vertex], [id, *third, *second]).mirrored, Some(*face));
             }
         }
     }
