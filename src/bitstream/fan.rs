@@ -203,3 +203,53 @@ impl Fan {
         Some((blade, [next, before]))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::IVec3;
+
+    use super::*;
+    use crate::bitstream::front::CodedTet;
+
+    /// A fan that is kept in step says the same as one that is gathered anew, at sizes on both sides of [`SCAN`].
+    #[test]
+    fn fans_keep_in_step() {
+        let mut seed = 3u64;
+        let mut random = |end: u32| {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 33) as u32 % end
+        };
+        let (mut front, mut vertices) = (Front::new(), Vertices::default());
+        for _ in 0..14 {
+            vertices.push(IVec3::from_array([0; 3].map(|_| random(100) as i32)), 0);
+        }
+        let (focus, mut fan, mut open) = (VertexId(5), Fan::NEW, Vec::new());
+        for step in 0..6000 {
+            let [second, third] = [0; 2].map(|_| VertexId(random(14)));
+            let is_growing = random(10) < if step % 1000 < 300 { 7 } else { 4 };
+            if is_growing && second != third && second != focus && third != focus {
+                let corners = [[second, third, focus], [third, focus, second]][random(2) as usize];
+                let plane = plane(corners.map(|v| vertices.position(v)));
+                if plane != I64Vec3::ZERO && !front.meet(&vertices, corners).is_there {
+                    let normal = plane.as_dvec3().normalize();
+                    let behind = CodedTet { number: 0, label: 0, opposite: focus };
+                    open.push(front.insert(&mut vertices, corners, normal, behind));
+                    fan.open(corners, open[open.len() - 1], normal, plane);
+                }
+            } else if !open.is_empty() {
+                let face = open.swap_remove(random(open.len() as u32) as usize);
+                front.remove(&mut vertices, face);
+                fan.close(face);
+            }
+            let mut anew = Fan::NEW;
+            for fan in [&mut fan, &mut anew] {
+                fan.turn_to(&front, &vertices, focus);
+            }
+            let [kept, anew] = [&mut fan, &mut anew].map(|fan| {
+                let found = fan.sharpest(&vertices)?;
+                Some((found.0.spoke, found.1.map(|blade| blade.map(|blade| blade.spoke))))
+            });
+            assert_eq!(kept, anew, "step {step}");
+        }
+    }
+}

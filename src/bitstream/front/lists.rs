@@ -195,22 +195,38 @@ impl Lists {
     }
 
     /// Adds a face to the list of a vertex. Returns the block that it is in.
+    #[inline]
     pub(super) fn push(&mut self, vertex: VertexId, list: &mut List, spoke: Spoke) -> u32 {
-        match self.blocks.get_mut(list.youngest as usize) {
-            Some(block) if (block.used as usize) < ROOM => {}
-            Some(block) if block.live.wrapping_add(1) != 1 << ROOM => block.close_ranks(),
-            _ => list.youngest = self.push_block(list.youngest),
+        if self.blocks.get(list.youngest as usize).is_none_or(|block| block.used as usize == ROOM) {
+            self.make_room(list);
         }
         let block = &mut self.blocks[list.youngest as usize];
-        block.put(block.used as usize, spoke);
+        block.put(block.used as usize % ROOM, spoke);
         block.used += 1;
         list.count += 1;
-        if list.count & IS_HUB != 0 {
-            self.at_hubs.insert([vertex, spoke.second, spoke.third], spoke.face);
-        } else if list.count > HUB[1] {
-            self.open_hub(vertex, list);
+        // So it is for hubs, too.
+        if list.count > HUB[1] {
+            self.push_at_hub(vertex, list, spoke);
         }
         list.youngest
+    }
+
+    /// Room for one more face in the youngest block of a list.
+    #[inline(never)]
+    fn make_room(&mut self, list: &mut List) {
+        match self.blocks.get_mut(list.youngest as usize) {
+            Some(block) if block.live + 1 != 1 << ROOM => block.close_ranks(),
+            _ => list.youngest = self.push_block(list.youngest),
+        }
+    }
+
+    #[cold]
+    fn push_at_hub(&mut self, vertex: VertexId, list: &mut List, spoke: Spoke) {
+        if list.count & IS_HUB != 0 {
+            self.at_hubs.insert([vertex, spoke.second, spoke.third], spoke.face);
+        } else {
+            self.open_hub(vertex, list);
+        }
     }
 
     /// An empty block before the youngest of a list.
@@ -230,6 +246,7 @@ impl Lists {
     }
 
     /// Takes a face out of the list of a vertex, from the block that it is in.
+    #[inline]
     pub(super) fn remove(&mut self, vertex: VertexId, list: &mut List, block: u32, face: u32) {
         let found = &mut self.blocks[block as usize];
         let equal = equal_lanes(&found.faces, face) & found.live;
@@ -237,17 +254,22 @@ impl Lists {
             return;
         }
         found.live ^= equal;
-        let Spoke { second, third, .. } = found.spoke(equal.trailing_zeros() as usize % ROOM);
+        let spoke = found.spoke(equal.trailing_zeros() as usize % ROOM);
         if found.live == 0 {
             let (older, younger) = (found.older, found.younger);
             self.unlink(list, block, older, younger);
         }
         list.count -= 1;
         if list.count & IS_HUB != 0 {
-            self.at_hubs.remove([vertex, second, third]);
-            if list.count() < HUB[0] {
-                self.close_hub(vertex, list);
-            }
+            self.remove_at_hub(vertex, list, spoke);
+        }
+    }
+
+    #[cold]
+    fn remove_at_hub(&mut self, vertex: VertexId, list: &mut List, spoke: Spoke) {
+        self.at_hubs.remove([vertex, spoke.second, spoke.third]);
+        if list.count() < HUB[0] {
+            self.close_hub(vertex, list);
         }
     }
 
