@@ -85,6 +85,8 @@ pub struct RenderParams {
 #[derive(Debug)]
 struct Slab {
     scene: Scene,
+    /// Whether the mesh has grown since the scene took it in: packets on the way to a picture cost no more than parsing.
+    is_behind: bool,
     /// Number of its first frame, counted from the start of the stream.
     first_frame: u64,
     /// The last time to draw, in frames since the slab's first: beyond it the mesh has not come yet.
@@ -126,15 +128,19 @@ impl Decoder {
         Ok(PacketInfo { frame_number: packet.frame_number, keyframe: packet.keyframe, picture: packet.picture })
     }
 
-    /// Lets the scene grow by what the last packet brought.
+    /// Notes what the last packet brought.
     fn take_mesh(&mut self, keyframe: bool) {
         let (Some(mesh), Some(first_frame)) = (self.parser.mesh(), self.parser.first_frame()) else { return };
         if keyframe {
             self.slab = None;
         }
-        let slab =
-            self.slab.get_or_insert_with(|| Slab { scene: Scene::new(mesh.domain), first_frame, last_frame: 0.0 });
-        slab.scene.extend(mesh);
+        let slab = self.slab.get_or_insert_with(|| Slab {
+            scene: Scene::new(mesh.domain),
+            is_behind: true,
+            first_frame,
+            last_frame: 0.0,
+        });
+        slab.is_behind = true;
         slab.last_frame = if self.parser.is_ended() {
             f64::from(mesh.domain.duration)
         } else {
@@ -202,14 +208,19 @@ impl Decoder {
     }
 }
 
-/// What is drawn of which slab.
+/// What is drawn of which slab; its scene is brought up to the mesh.
 fn drawing<'a>(
     config: &DecoderConfig,
     parser: &SlabParser,
     slab: &'a mut Option<Slab>,
     params: &RenderParams,
 ) -> Result<(&'a mut Slab, DrawingAt), DecodeError> {
-    let (Some(slab), Some(header)) = (slab, parser.header()) else { return Err(DecodeError::NoKeyframe) };
+    let (Some(slab), Some(header), Some(mesh)) = (slab, parser.header(), parser.mesh()) else {
+        return Err(DecodeError::NoKeyframe);
+    };
+    if std::mem::take(&mut slab.is_behind) {
+        slab.scene.extend(mesh);
+    }
     let levels = config.subdivision_levels.unwrap_or(header.subdivision_levels).min(MAX_LEVELS);
     let frame = (params.frame - slab.first_frame as f64).min(slab.last_frame);
     let RenderParams { viewport, mesh, .. } = *params;

@@ -103,6 +103,26 @@ fn to_channels([red, green, blue]: Grains) -> [i64; 3] {
     [green, red - green, blue - green].map(i64::from)
 }
 
+/// A coded colour as predictions need it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct KnownColor {
+    /// Green, red less green, blue less green.
+    channels: [i32; 3],
+    misses: Misses,
+    /// 1; 0 in what stands for no colour.
+    count: u16,
+}
+
+impl KnownColor {
+    pub(super) fn new(color: Grains, misses: Misses) -> Self {
+        Self { channels: to_channels(color).map(|channel| channel as i32), misses, count: 1 }
+    }
+
+    pub(super) fn without_misses(self) -> Self {
+        Self { misses: [0; 2], ..self }
+    }
+}
+
 /// What a wedge's colour is predicted from: sums over the known wedges of its star, as often as tets have them.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Around {
@@ -114,13 +134,15 @@ pub(super) struct Around {
 
 impl Around {
     /// Takes a wedge in.
-    pub(super) fn add(&mut self, color: Grains, misses: Misses) {
-        self.count += 1;
-        for (channel, value) in to_channels(color).into_iter().enumerate() {
+    #[inline]
+    pub(super) fn add(&mut self, color: KnownColor) {
+        self.count += i64::from(color.count);
+        for (channel, value) in color.channels.into_iter().enumerate() {
+            let value = i64::from(value);
             self.sum[channel] += value;
             self.squares[channel] += value * value;
         }
-        for (sum, miss) in self.misses.iter_mut().zip(misses) {
+        for (sum, miss) in self.misses.iter_mut().zip(color.misses) {
             *sum += i64::from(miss);
         }
     }

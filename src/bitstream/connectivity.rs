@@ -10,16 +10,18 @@
 //! first, and its angle is the context. Meshes are long in time where nothing moves, so angles and distances are
 //! measured in the extents of the edges around.
 
-use glam::{DVec3, IVec3};
+use glam::{DVec3, I64Vec3, IVec3};
 
 use super::MeshFault;
 use super::bits::Part;
-use super::extents::{Extents, PARTS};
+use super::extents::{self, PARTS};
+use super::fan::{Fan, gap_cos};
 use super::front::Front;
-use super::near::{far_vertices, near_vertices};
+use super::near::{Ranking, Rings};
 use super::range_coder::{BitCoder, BitModel};
 use super::symbols::UintModel;
-use crate::mesh::{TetMesh, VertexId, volume6};
+use super::vertices::Vertices;
+use crate::mesh::VertexId;
 
 /// Open faces of one vertex that are looked at. Typical vertices have six; a hub of thousands stays cheap.
 pub(super) const SCAN: usize = 24;
@@ -67,6 +69,9 @@ pub(super) struct Gate {
     /// Vertices of the open faces across its edges: from third corner to first, first to second, second to third.
     pub(super) across: [Option<VertexId>; 3],
     candidates: [Option<Candidate>; 3],
+    /// Position of the focus, and the plane through it.
+    origin: IVec3,
+    plane: I64Vec3,
 }
 
 impl Gate {
@@ -75,21 +80,22 @@ impl Gate {
     }
 
     /// Whether the tet of the gate and `apex` is positive.
-    pub(super) fn is_positive(&self, mesh: &TetMesh, apex: VertexId) -> bool {
-        is_positive(mesh, self.corners, apex)
+    #[inline]
+    pub(super) fn is_positive(&self, vertices: &Vertices, apex: VertexId) -> bool {
+        self.plane.dot((vertices.position(apex) - self.origin).as_i64vec3()) > 0
     }
 
     /// Square of the distance of a vertex from the gate's centre, in extents.
-    pub(super) fn distance2(&self, mesh: &TetMesh, vertex: VertexId) -> f64 {
-        let at = |v: VertexId| mesh.positions[v.index()];
+    pub(super) fn distance2(&self, vertices: &Vertices, vertex: VertexId) -> f64 {
+        let at = |v: VertexId| vertices.position(v);
         let [a, b, c] = self.corners.map(at);
         let d = (3 * at(vertex) - (a + b + c)).as_dvec3() / self.extent.as_dvec3();
         f64::from(PARTS * PARTS) * (d.x * d.x + d.y * d.y + d.z * d.z)
     }
 
     /// Class of that distance.
-    fn range(&self, mesh: &TetMesh, vertex: VertexId) -> usize {
-        let distance2 = self.distance2(mesh, vertex);
+    fn range(&self, vertices: &Vertices, vertex: VertexId) -> usize {
+        let distance2 = self.distance2(vertices, vertex);
         DISTANCES.iter().filter(|&&limit| distance2 > limit).count()
     }
 }
@@ -125,128 +131,48 @@ fn angle_class(cos: f64) -> usize {
     (((cos + 1.0) * (ANGLES as f64 / 2.0)) as usize).min(ANGLES - 1)
 }
 
-/// Whether the tet of `corners` and `apex` is positive.
-#[inline]
-fn is_positive(mesh: &TetMesh, [a, b, c]: [VertexId; 3], apex: VertexId) -> bool {
-    let at = |v: VertexId| mesh.positions[v.index()];
-    volume6(at(a), at(b), at(c), at(apex)) > 0
-}
-
-/// Cosine of the angle between two open faces with a common edge and these unit normals, measured on the open side;
-/// angles beyond 180 degrees are the caller's to exclude.
-fn gap_cos(n: DVec3, m: DVec3) -> f64 {
-    -(n.x * m.x + n.y * m.y + n.z * m.z)
-}
-
-/// The youngest open faces of a vertex, as columns: they are compared all with all.
-#[derive(Debug, Clone)]
-pub(super) struct Fan {
-    count: usize,
-    faces: [u32; SCAN],
-    /// The corner after the focus, anticlockwise.
-    second: [VertexId; SCAN],
-    /// The corner before it.
-    third: [VertexId; SCAN],
-    normals: [DVec3; SCAN],
-}
-
-impl Fan {
-    pub(super) const NEW: Self = Self {
-        count: 0,
-        faces: [0; SCAN],
-        second: [VertexId(0); SCAN],
-        third: [VertexId(0); SCAN],
-        normals: [DVec3::ZERO; SCAN],
-    };
-
-    fn gather(&mut self, front: &Front, focus: VertexId) {
-        self.count = 0;
-        for (face, [_, second, third]) in front.at(focus).take(SCAN) {
-            let place = self.count;
-            self.faces[place] = face;
-            self.second[place] = second;
-            self.third[place] = third;
-            self.normals[place] = front.face(face).normal;
-            self.count += 1;
-        }
-    }
-
-    /// The youngest face that follows face `place` around the focus.
-    fn next(&self, place: usize) -> Option<usize> {
-        let wanted = self.third[place];
-        self.second[..self.count].iter().position(|&second| second == wanted)
-    }
-
-    /// The youngest face that comes before face `place` around the focus.
-    fn previous(&self, place: usize) -> Option<usize> {
-        let wanted = self.second[place];
-        self.third[..self.count].iter().position(|&third| third == wanted)
-    }
-
-    /// The face before the sharpest gap; without a gap below 180 degrees the youngest.
-    fn sharpest(&self, mesh: &TetMesh, focus: VertexId) -> usize {
-        let (mut best, mut best_cos) = (0, f64::NEG_INFINITY);
-        for place in 0..self.count {
-            let Some(next) = self.next(place) else { continue };
-            let cos = gap_cos(self.normals[place], self.normals[next]);
-            let corners = [focus, self.second[place], self.third[place]];
-            if cos > best_cos && is_positive(mesh, corners, self.third[next]) {
-                (best, best_cos) = (place, cos);
-            }
-        }
-        best
-    }
-}
-
 /// The open face at `focus` to close next: the one before the sharpest gap at an edge of `focus`, going around it
-/// anticlockwise. `None`: all faces at `focus` are closed. `fan` is room to work in.
-pub(super) fn choose_gate(
-    fan: &mut Fan,
-    (front, mesh): (&Front, &TetMesh),
-    extents: &Extents,
-    focus: VertexId,
-) -> Option<Gate> {
-    fan.gather(front, focus);
-    if fan.count == 0 {
-        return None;
-    }
-    let place = fan.sharpest(mesh, focus);
-    let corners = [focus, fan.second[place], fan.third[place]];
+/// anticlockwise. `None`: all faces at `focus` are closed.
+pub(super) fn choose_gate(fan: &mut Fan, (front, vertices): (&Front, &Vertices), focus: VertexId) -> Option<Gate> {
+    fan.turn_to(front, vertices, focus);
+    let (blade, [next, previous]) = fan.sharpest(vertices)?;
+    let corners = [focus, blade.spoke.second, blade.spoke.third];
     let across = [
-        fan.next(place).map(|next| (fan.third[next], fan.normals[next])),
-        fan.previous(place).map(|previous| (fan.second[previous], fan.normals[previous])),
-        find_opposite(front, corners),
+        next.map(|next| (next.spoke.third, next.normal)),
+        previous.map(|previous| (previous.spoke.second, previous.normal)),
+        find_opposite(front, vertices, corners),
     ];
-    let mut candidates: [Option<Candidate>; 3] = [None; 3];
+    let mut gate = Gate {
+        face: blade.spoke.face,
+        corners,
+        extent: extents::around(vertices, corners),
+        origin: vertices.position(focus),
+        plane: blade.plane,
+        across: across.map(|found| found.map(|(vertex, _)| vertex)),
+        candidates: [None; 3],
+    };
     for (vertex, normal) in across.into_iter().flatten() {
-        if is_positive(mesh, corners, vertex) {
-            add_candidate(&mut candidates, vertex, gap_cos(fan.normals[place], normal));
+        if gate.is_positive(vertices, vertex) {
+            add_candidate(&mut gate.candidates, vertex, gap_cos(blade.normal, normal));
         }
     }
-    // Those of several edges first, then by angle. Stable: ties keep the order of edges.
-    candidates.sort_by(|a, b| {
-        let key = |c: &Option<Candidate>| c.map_or((0, f64::NEG_INFINITY), |c| (c.edges, c.cos));
-        let (a, b) = (key(a), key(b));
-        b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
-    });
-    Some(Gate {
-        face: fan.faces[place],
-        corners,
-        extent: extents.around(corners),
-        across: across.map(|found| found.map(|(vertex, _)| vertex)),
-        candidates,
-    })
+    // Those of several edges first, then by angle. Neighbours only, so that ties keep the order of edges.
+    for place in [0, 1, 0] {
+        let [Some(a), Some(b)] = [gate.candidates[place], gate.candidates[place + 1]] else { continue };
+        if b.edges > a.edges || (b.edges == a.edges && b.cos > a.cos) {
+            gate.candidates.swap(place, place + 1);
+        }
+    }
+    Some(gate)
 }
 
 /// The vertex and the normal of the youngest open face across the gate's edge opposite the focus.
-fn find_opposite(front: &Front, [_, a, b]: [VertexId; 3]) -> Option<(VertexId, DVec3)> {
+fn find_opposite(front: &Front, vertices: &Vertices, [_, a, b]: [VertexId; 3]) -> Option<(VertexId, DVec3)> {
     // Neighbours run through a common edge in opposite directions, this one from b to a. Of its two ends the one with
     // fewer open faces is searched.
-    let from_a = front.count(a) <= front.count(b);
-    let (start, end) = if from_a { (a, b) } else { (b, a) };
-    let turned = |[_, second, third]: [VertexId; 3]| if from_a { (third, second) } else { (second, third) };
-    let mut faces = front.at(start).take(SCAN).map(|(face, corners)| (face, turned(corners)));
-    let (face, (_, vertex)) = faces.find(|&(_, (across, _))| across == end)?;
+    let from_a = vertices[a].list.count() <= vertices[b].list.count();
+    let ends = if from_a { [a, b] } else { [b, a] };
+    let (face, vertex) = front.across(vertices, ends, SCAN as u32, from_a)?;
     Some((vertex, front.face(face).normal))
 }
 
@@ -273,8 +199,8 @@ fn add_candidate(candidates: &mut [Option<Candidate>; 3], vertex: VertexId, cos:
 /// A reference to a vertex that does not exist.
 pub(super) fn code_apex(
     coder: &mut impl BitCoder,
-    models: &mut ConnectivityModels,
-    (front, mesh): (&Front, &TetMesh),
+    (models, rings): (&mut ConnectivityModels, &mut Rings),
+    (front, vertices): (&Front, &Vertices),
     gate: &Gate,
     truth: Apex,
 ) -> Result<Apex, MeshFault> {
@@ -282,7 +208,7 @@ pub(super) fn code_apex(
     let mut first = (0, 0);
     let mut count = 0;
     for (place, candidate) in gate.candidates.iter().flatten().enumerate() {
-        let (angle, range) = (angle_class(candidate.cos), gate.range(mesh, candidate.vertex));
+        let (angle, range) = (angle_class(candidate.cos), gate.range(vertices, candidate.vertex));
         let model = &mut models.join[place][candidate.edges - 1][angle][range];
         if coder.bit(model, truth == Apex::Known(candidate.vertex)) {
             return Ok(Apex::Known(candidate.vertex));
@@ -295,32 +221,38 @@ pub(super) fn code_apex(
     if coder.bit(&mut models.new[count][first.0][first.1], truth == Apex::New) {
         return Ok(Apex::New);
     }
-    if let Some(near) = code_rank(coder, &mut models.near, &near_vertices(front, mesh, gate), truth)? {
+    let near = |rings: &mut Rings| Ranking::new(vertices, gate, rings.near(front, vertices, gate));
+    if let Some(near) = code_rank(coder, &mut models.near, || near(rings), truth)? {
         return Ok(Apex::Known(near));
     }
     if coder.bit(&mut models.nothing, matches!(truth, Apex::Hole | Apex::Top)) {
         return Ok(if coder.bit(&mut models.top, truth == Apex::Top) { Apex::Top } else { Apex::Hole });
     }
-    if let Some(far) = code_rank(coder, &mut models.far, &far_vertices(front, mesh, gate), truth)? {
+    let far = |rings: &mut Rings| Ranking::new(vertices, gate, rings.far(front, vertices, gate));
+    if let Some(far) = code_rank(coder, &mut models.far, || far(rings), truth)? {
         return Ok(Apex::Known(far));
     }
     let known = if let Apex::Known(v) = truth { v } else { VertexId(0) };
-    code_vertex_id(coder, known, mesh.positions.len() as u32).map(Apex::Known)
+    code_vertex_id(coder, known, vertices.len() as u32).map(Apex::Known)
 }
 
-/// Codes which of the `ranked` vertices the apex is, if it is one of them.
-fn code_rank(
+/// Codes which of the `ranked` vertices the apex is, if it is one of them. They are not asked for in vain: to rank them
+/// takes time.
+fn code_rank<'a>(
     coder: &mut impl BitCoder,
     model: &mut UintModel,
-    ranked: &[VertexId],
+    mut ranked: impl FnMut() -> Ranking<'a>,
     truth: Apex,
 ) -> Result<Option<VertexId>, MeshFault> {
-    let rank = ranked.iter().position(|&v| truth == Apex::Known(v)).map_or(0, |place| place as u32 + 1);
+    let rank = match truth {
+        Apex::Known(apex) => ranked().position(|v| v == apex).map_or(0, |place| place as u32 + 1),
+        _ => 0,
+    };
     let rank = model.code(coder, rank);
     let Some(place) = rank.checked_sub(1) else { return Ok(None) };
-    let expected = ranked.len() as u32;
-    let fault = MeshFault::Reference { field: "vertex near the gate", expected, found: place };
-    ranked.get(place as usize).copied().map(Some).ok_or(fault)
+    let mut expected = 0;
+    let found = ranked().inspect(|_| expected += 1).nth(place as usize);
+    found.map(Some).ok_or(MeshFault::Reference { field: "vertex near the gate", expected, found: place })
 }
 
 /// Codes a reference to one of `count` vertices as a plain number.

@@ -4,39 +4,39 @@
 //! floating point, and any order that depends on more than the order of calls.
 
 use glam::IVec3;
+use wide::i32x4;
 
+use super::vertices::Vertices;
 use crate::mesh::VertexId;
 
 /// Extents are counted in this part of a lattice unit.
 pub(crate) const PARTS: i32 = 16;
 
-/// Per vertex the running mean of the extents of the edges at it, in 1/16 lattice units; 0 before its first tet.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Extents(Vec<IVec3>);
-
-impl Extents {
-    pub(super) fn push_vertex(&mut self) {
-        self.0.push(IVec3::ZERO);
+/// Takes a tet into the running means of the extents of the edges at its corners, in 1/16 lattice units; they are 0
+/// before the first.
+pub(super) fn learn(vertices: &mut Vertices, corners: [VertexId; 4], positions: [IVec3; 4]) {
+    let [a, b, c, d] = positions.map(lanes);
+    let [ab, ac, ad] = [(b - a).abs(), (c - a).abs(), (d - a).abs()];
+    let [bc, bd, cd] = [(c - b).abs(), (d - b).abs(), (d - c).abs()];
+    let around = [ab + ac + ad, ab + bc + bd, ac + bc + cd, ad + bd + cd];
+    for (vertex, sum) in corners.into_iter().zip(around) {
+        // A third, exact for what is not negative.
+        let here = (sum * i32x4::splat(PARTS)).mul_keep_high(i32x4::splat(0x5555_5556));
+        let mean = &mut vertices[vertex].extent;
+        let known = lanes(*mean);
+        let next = if *mean == IVec3::ZERO { here } else { known + ((here - known) >> 2) };
+        let [x, y, t, _] = next.to_array();
+        *mean = IVec3::new(x, y, t);
     }
+}
 
-    /// Takes a tet into the means of its corners.
-    pub(super) fn learn(&mut self, corners: [VertexId; 4], positions: [IVec3; 4]) {
-        for (vertex, from) in corners.into_iter().zip(positions) {
-            let here = positions.into_iter().map(|to| (to - from).abs()).sum::<IVec3>() * PARTS / 3;
-            let mean = &mut self.0[vertex.index()];
-            *mean = if *mean == IVec3::ZERO { here } else { *mean + ((here - *mean) >> 2) };
-        }
-    }
+fn lanes(v: IVec3) -> i32x4 {
+    i32x4::new([v.x, v.y, v.z, 0])
+}
 
-    /// The sum over three vertices, at least that of a lattice unit.
-    pub(super) fn around(&self, vertices: [VertexId; 3]) -> IVec3 {
-        vertices.map(|v| self.0[v.index()]).into_iter().sum::<IVec3>().max(IVec3::splat(3 * PARTS))
-    }
-
-    /// Binary logarithm of the product of a vertex's extents.
-    pub(super) fn size(&self, vertex: VertexId) -> i32 {
-        size_of(self.0[vertex.index()])
-    }
+/// The sum over three vertices, at least that of a lattice unit.
+pub(super) fn around(vertices: &Vertices, [a, b, c]: [VertexId; 3]) -> IVec3 {
+    (vertices[a].extent + vertices[b].extent + vertices[c].extent).max(IVec3::splat(3 * PARTS))
 }
 
 /// Binary logarithm of the product of three extents in 1/16 lattice units.
@@ -51,16 +51,16 @@ mod tests {
 
     #[test]
     fn means_follow_the_tets() {
-        let mut extents = Extents::default();
-        (0..4).for_each(|_| extents.push_vertex());
+        let mut vertices = Vertices::default();
+        (0..4).for_each(|_| vertices.push(IVec3::ZERO, 0));
         let corners = [0, 1, 2, 3].map(VertexId);
-        assert_eq!(extents.around([corners[0]; 3]), IVec3::splat(48));
-        assert_eq!(extents.size(corners[0]), 0);
+        assert_eq!(around(&vertices, [corners[0]; 3]), IVec3::splat(48));
+        assert_eq!(size_of(vertices[corners[0]].extent), 0);
         let at = [[0, 0, 0], [30, 0, 0], [0, 60, 0], [0, 0, 90]].map(IVec3::from_array);
-        extents.learn(corners, at);
-        assert_eq!(extents.0[0], IVec3::new(160, 320, 480));
-        assert_eq!(extents.size(corners[0]), 24);
-        extents.learn(corners, at.map(|p| p * 2));
-        assert_eq!(extents.0[0], IVec3::new(200, 400, 600));
+        learn(&mut vertices, corners, at);
+        assert_eq!(vertices[corners[0]].extent, IVec3::new(160, 320, 480));
+        assert_eq!(size_of(vertices[corners[0]].extent), 24);
+        learn(&mut vertices, corners, at.map(|p| p * 2));
+        assert_eq!(vertices[corners[0]].extent, IVec3::new(200, 400, 600));
     }
 }

@@ -8,6 +8,7 @@ mod colors;
 mod connectivity;
 mod error;
 mod extents;
+mod fan;
 mod framing;
 mod front;
 mod header;
@@ -24,6 +25,7 @@ mod slab;
 mod source;
 mod stars;
 mod symbols;
+mod vertices;
 #[cfg(feature = "encode")]
 mod writer;
 

@@ -7,7 +7,7 @@ use glam::IVec3;
 use super::MeshFault;
 use super::bits::Part;
 use super::extents::PARTS;
-use super::front::unit_normal;
+use super::front::{plane, unit_normal};
 use super::header::MAX_EXTENT;
 use super::range_coder::{BitCoder, BitModel};
 use super::symbols::{IntModel, UintModel};
@@ -96,6 +96,13 @@ impl Bounds {
         if self.top_known { extent } else { IVec3::new(extent.x, extent.y, MAX_EXTENT) }
     }
 
+    /// The sides that a vertex lies on, as bits, but for the end of the slab, which is not known from the start.
+    pub(super) fn sides(&self, position: IVec3) -> u8 {
+        let far = self.domain.extent();
+        let on = [position.x == 0, position.x == far.x, position.y == 0, position.y == far.y, position.z == 0];
+        on.into_iter().enumerate().map(|(side, on)| u8::from(on) << side).sum()
+    }
+
     /// The high side along an axis; the end of the slab is one only once it is known.
     fn high_side(&self, axis: usize) -> Option<i32> {
         (axis < 2 || self.top_known).then_some(self.far()[axis])
@@ -120,9 +127,9 @@ struct Expectation {
 impl Expectation {
     fn new(behind: &Behind) -> Self {
         let [a, b, c] = behind.gate;
-        let (u, v) = ((b - a).as_i64vec3(), (c - a).as_i64vec3());
+        let plane = plane(behind.gate);
         let extent = behind.extent.as_dvec3() / f64::from(3 * PARTS);
-        let normal = unit_normal(behind.gate, extent);
+        let normal = unit_normal(plane, extent);
         let sum = a + b + c;
         let mut ahead = 3 * (SECOND * b + FIRST * a + OPPOSITE * behind.opposite) - (SECOND + FIRST + OPPOSITE) * sum;
         for (weight, across) in ACROSS.into_iter().zip(behind.across) {
@@ -136,7 +143,7 @@ impl Expectation {
         // The first of equals.
         let steeper = |best: usize, axis: usize| if normal[axis].abs() > normal[best].abs() { axis } else { best };
         let last = steeper(steeper(0, 1), 2);
-        Self { extent, normal, predicted, plane: u.cross(v).to_array(), origin: a, last }
+        Self { extent, normal, predicted, plane: plane.to_array(), origin: a, last }
     }
 
     /// Coordinates in the order in which they are coded.

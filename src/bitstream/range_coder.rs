@@ -12,18 +12,17 @@ use super::bits::Part;
 /// The probability that a decision is 1, learnt from the decisions coded before in the same context.
 ///
 /// The mean of the decisions so far, then an exponential average of the last ones.
+///
+/// Both in one word, as models are what the caches of a coder are full of: P(1) in 2^-22 above, and below, in
+/// [`SEEN_BITS`], the number of decisions so far, at most [`SEEN_MAX`].
 #[derive(Debug, Clone, Copy)]
-pub(super) struct BitModel {
-    /// P(1) in 2^-22.
-    average: u32,
-    /// Decisions so far, at most [`SEEN_MAX`].
-    seen: u32,
-}
+pub(super) struct BitModel(u32);
 
 /// Binary digits of an average.
 const AVERAGE_BITS: u32 = 22;
 /// Decisions after which a model no longer learns more slowly.
-const SEEN_MAX: u32 = 255;
+const SEEN_MAX: u32 = (1 << SEEN_BITS) - 1;
+const SEEN_BITS: u32 = 8;
 
 /// What part of the way to the next decision the average of n decisions moves, in 1/65536: 1 / (n + 1.5).
 const RATES: [u32; SEEN_MAX as usize + 1] = {
@@ -38,21 +37,21 @@ const RATES: [u32; SEEN_MAX as usize + 1] = {
 
 impl BitModel {
     /// A model that expects nothing.
-    pub(super) const NEW: Self = Self { average: 1 << (AVERAGE_BITS - 1), seen: 0 };
+    pub(super) const NEW: Self = Self(1 << (AVERAGE_BITS - 1 + SEEN_BITS));
 
     /// P(1) in 1/65536, kept away from 0 and 1.
+    #[inline]
     fn probability(self) -> u32 {
-        (self.average >> (AVERAGE_BITS - 16)).clamp(32, 65_504)
+        (self.0 >> (SEEN_BITS + AVERAGE_BITS - 16)).clamp(32, 65_504)
     }
 
+    #[inline]
     fn update(&mut self, bit: bool) {
-        let rate = u64::from(RATES[self.seen as usize]);
-        if bit {
-            self.average += ((u64::from((1 << AVERAGE_BITS) - self.average) * rate) >> 16) as u32;
-        } else {
-            self.average -= ((u64::from(self.average) * rate) >> 16) as u32;
-        }
-        self.seen = (self.seen + 1).min(SEEN_MAX);
+        let (average, seen) = (self.0 >> SEEN_BITS, self.0 & SEEN_MAX);
+        let rate = u64::from(RATES[seen as usize]);
+        let part = |distance: u32| ((u64::from(distance) * rate) >> 16) as u32;
+        let average = if bit { average + part((1 << AVERAGE_BITS) - average) } else { average - part(average) };
+        self.0 = average << SEEN_BITS | (seen + 1).min(SEEN_MAX);
     }
 }
 
@@ -167,48 +166,79 @@ impl BitCoder for RangeEncoder {
 #[derive(Debug)]
 pub(super) struct RangeDecoder<'a> {
     bytes: &'a [u8],
+    /// Bytes taken into the window.
     next: usize,
-    code: u32,
+    /// The code above 32 bits, and below it, from the highest bit down, those that follow.
+    window: u64,
+    /// How many follow: whole bytes, at least [`SPARE`] bits of them between decisions.
+    spare: u32,
     range: u32,
 }
+
+/// Bits that one decision can take up: a probability of 1/2048 leaves 2^13 of a range of 2^24.
+const SPARE: u32 = 16;
 
 impl<'a> RangeDecoder<'a> {
     /// Zeros that may be read past the end, since the encoder leaves zeros at the end out.
     pub(super) const FREE_BYTES: u32 = 4;
 
     pub(super) fn new(bytes: &'a [u8]) -> Self {
-        let mut decoder = Self { bytes, next: 0, code: 0, range: u32::MAX };
-        for _ in 0..4 {
-            decoder.shift();
+        let mut decoder = Self { bytes, next: 0, window: 0, spare: 0, range: u32::MAX };
+        for _ in 0..3 {
+            decoder.window <<= SPARE;
+            decoder.window |= u64::from(decoder.two_bytes());
         }
+        decoder.window <<= SPARE;
+        decoder.spare = SPARE;
         decoder
     }
 
-    fn shift(&mut self) {
-        self.code = self.code << 8 | u32::from(self.bytes.get(self.next).copied().unwrap_or(0));
-        self.next = self.next.saturating_add(1);
+    #[inline]
+    fn two_bytes(&mut self) -> u16 {
+        let two = self.bytes.get(self.next..).and_then(<[u8]>::first_chunk);
+        let two = two.map_or_else(|| self.last_bytes(), |two| u16::from_be_bytes(*two));
+        self.next = self.next.saturating_add(2);
+        two
     }
 
+    #[cold]
+    fn last_bytes(&self) -> u16 {
+        u16::from(self.bytes.get(self.next).copied().unwrap_or(0)) << 8
+    }
+
+    #[inline]
     fn normalize(&mut self) {
-        while self.range < RANGE_MIN {
-            self.range <<= 8;
-            self.shift();
+        // Whole bytes, without a branch: whether one is due is as good as random.
+        let shift = self.range.leading_zeros() & !7;
+        self.range <<= shift;
+        self.window <<= shift;
+        self.spare -= shift;
+        if self.spare < SPARE {
+            let two = self.two_bytes();
+            self.window |= u64::from(two) << (32 - SPARE - self.spare);
+            self.spare += SPARE;
         }
     }
 
+    /// Bytes that decisions have come to, those of the code with them.
+    fn used(&self) -> usize {
+        self.next - self.spare as usize / 8
+    }
+
     /// Whether more has been read than any encoder wrote.
+    #[inline]
     pub(super) fn is_exhausted(&self) -> bool {
-        self.next > self.bytes.len() + Self::FREE_BYTES as usize
+        self.used() > self.bytes.len() + Self::FREE_BYTES as usize
     }
 
     /// Information of the decisions read so far, in bits.
     pub(super) fn position(&self) -> f64 {
-        8.0 * self.next as f64 - f64::from(self.range).log2()
+        8.0 * self.used() as f64 - f64::from(self.range).log2()
     }
 
     /// Bytes at the end that were not read.
     pub(super) fn unread(&self) -> usize {
-        self.bytes.len().saturating_sub(self.next)
+        self.bytes.len().saturating_sub(self.used())
     }
 }
 
@@ -216,11 +246,12 @@ impl BitCoder for RangeDecoder<'_> {
     #[inline]
     fn bit(&mut self, model: &mut BitModel, _: bool) -> bool {
         let bound = ((u64::from(self.range) * u64::from(model.probability())) >> 16) as u32;
-        let bit = self.code < bound;
+        let code = (self.window >> 32) as u32;
+        let bit = code < bound;
         if bit {
             self.range = bound;
         } else {
-            self.code -= bound;
+            self.window -= u64::from(bound) << 32;
             self.range -= bound;
         }
         model.update(bit);
@@ -232,9 +263,9 @@ impl BitCoder for RangeDecoder<'_> {
         let mut value = 0;
         for _ in 0..count {
             self.range >>= 1;
-            let bit = self.code < self.range;
+            let bit = self.window >> 32 < u64::from(self.range);
             if !bit {
-                self.code -= self.range;
+                self.window -= u64::from(self.range) << 32;
             }
             value = value << 1 | u32::from(bit);
             self.normalize();

@@ -11,20 +11,20 @@ mod wedges;
 use glam::IVec3;
 
 use super::bits::Part;
-use super::colors::{ColorModels, ColorSteps, Grains, Misses};
-use super::connectivity::{Apex, ConnectivityModels, Fan, Gate, choose_gate, code_apex, code_vertex_id};
-use super::extents::{Extents, PARTS};
-use super::front::{Front, unit_normal};
+use super::colors::{ColorModels, ColorSteps, Grains, KnownColor};
+use super::connectivity::{Apex, ConnectivityModels, Gate, choose_gate, code_apex, code_vertex_id};
+use super::extents::{self, PARTS};
+use super::fan::Fan;
+use super::front::{CodedTet, Front, Met, plane, unit_normal};
 use super::hops::{Hops, RINGS};
 use super::labels::LabelModels;
+use super::near::Rings;
 use super::positions::{Behind, Bounds, PositionModels, code_free_position, code_position};
 use super::range_coder::{BitCoder, BitModel};
 use super::stars::Stars;
+use super::vertices::Vertices;
 use super::{Limits, MeshFault};
 use crate::mesh::{Domain, FACES, TetMesh, VertexId, volume6};
-
-/// End of a list.
-const NONE: u32 = u32::MAX;
 
 /// One side of the coding: the writer, who answers with the truth, or the parser, whose answers are ignored. Calls
 /// follow the syntax; each tet begins with `seed` or `behind`.
@@ -72,10 +72,8 @@ struct Models {
 pub(super) struct Slab {
     /// What is coded, its duration provisional until the end of the slab is known: the least that exceeds all t.
     mesh: TetMesh,
-    /// Colours of `mesh.wedges`.
-    colors: Vec<Grains>,
-    /// How far off their predictions were.
-    misses: Vec<Misses>,
+    /// Colours of `mesh.wedges` as far as they are coded.
+    known: Vec<KnownColor>,
     color_steps: ColorSteps,
     bounds: Bounds,
     /// Longest duration allowed, in frames.
@@ -83,19 +81,19 @@ pub(super) struct Slab {
     limits: Limits,
     front: Front,
     fan: Fan,
+    rings: Rings,
     hops: Hops,
     models: Box<Models>,
     /// Last wedge of each label.
     last_wedge: Vec<u32>,
-    /// Per vertex its youngest wedge, per wedge the next older one of its vertex.
-    wedge_head: Vec<u32>,
+    /// Per wedge the next older one of its vertex.
     wedge_next: Vec<u32>,
+    vertices: Vertices,
     stars: Stars,
-    extents: Extents,
     /// Vertices of each tet: the mesh has them only by way of its wedges.
     corners: Vec<[VertexId; 4]>,
-    /// Per vertex the hop that its neighbours have been told, and how many tets it had then.
-    passed_on: Vec<(u8, u32)>,
+    /// Per tet the lowest of the hops that its corners have been told.
+    told: Vec<u8>,
     /// Lengths of the mesh's arrays, and its duration, when the last packet was complete.
     complete: Complete,
 }
@@ -127,14 +125,14 @@ impl Slab {
         let domain = Domain { duration: 1, ..params.domain };
         Self {
             mesh: TetMesh::empty(domain),
-            colors: Vec::new(),
-            misses: Vec::new(),
+            known: Vec::new(),
             color_steps: params.color_steps,
             bounds: Bounds { domain, top_known: false },
             max_duration: params.max_duration,
             limits: params.limits,
             front: Front::new(),
             fan: Fan::NEW,
+            rings: Rings::default(),
             hops: Hops::new(),
             models: Box::new(Models {
                 connectivity: ConnectivityModels::NEW,
@@ -145,12 +143,11 @@ impl Slab {
                 seed_known: BitModel::NEW,
             }),
             last_wedge: Vec::new(),
-            wedge_head: Vec::new(),
             wedge_next: Vec::new(),
+            vertices: Vertices::default(),
             stars: Stars::default(),
-            extents: Extents::default(),
             corners: Vec::new(),
-            passed_on: Vec::new(),
+            told: Vec::new(),
             complete: Complete { duration: 1, ..Complete::default() },
         }
     }
@@ -243,21 +240,31 @@ impl Slab {
     }
 
     fn choose_gate(&mut self, focus: VertexId) -> Option<Gate> {
-        choose_gate(&mut self.fan, (&self.front, &self.mesh), &self.extents, focus)
+        choose_gate(&mut self.fan, (&self.front, &self.vertices), focus)
     }
 
     /// The neighbours of `vertex`, whose star is complete, are one edge farther. Tets that were there the last time
-    /// are passed over, so that all visits together are linear in the star.
+    /// are passed over, so that all visits together are linear in the star. So are those that another vertex with as
+    /// low a hop has told.
     fn pass_hop_on(&mut self, vertex: VertexId, hop: u8) {
         if hop == RINGS {
             return;
         }
-        let count = self.stars.count(vertex);
-        let (told, before) = std::mem::replace(&mut self.passed_on[vertex.index()], (hop, count));
-        let new = if told == hop { count - before } else { count };
-        for tet in self.stars.at(vertex).take(new as usize) {
-            for neighbour in self.corners[tet as usize] {
-                self.hops.lower(neighbour, hop + 1);
+        let known = &mut self.vertices[vertex];
+        let star = known.star;
+        let new = if known.told_hop == hop { star.count - known.told_tets } else { star.count };
+        (known.told_tets, known.told_hop) = (star.count, hop);
+        for run in self.stars.runs(star, new) {
+            // All that are untold are found before the first of them is gone into: so the waits for memory overlap.
+            let untold = |(i, &tet): (usize, &u32)| u32::from(self.told[tet as usize] > hop) << i;
+            let mut untold: u32 = run.iter().enumerate().map(untold).sum();
+            while let Some(youngest) = untold.checked_ilog2() {
+                untold ^= 1 << youngest;
+                let tet = run[youngest as usize] as usize;
+                self.told[tet] = hop;
+                for neighbour in self.corners[tet] {
+                    self.hops.lower(neighbour, hop + 1);
+                }
             }
         }
     }
@@ -267,20 +274,20 @@ impl Slab {
         side.check()?;
         if self.is_walled(gate.corners) {
             // It lies on t = duration, which was not known when it was opened.
-            self.front.remove(gate.face);
+            self.close_face(gate.face);
             return Ok(());
         }
-        let before = self.front.face(gate.face).tet;
-        let truth = side.behind(before, gate.corners);
-        let around = (&self.front, &self.mesh);
-        let apex = match code_apex(side, &mut self.models.connectivity, around, gate, truth)? {
+        let before = self.front.face(gate.face).behind;
+        let truth = side.behind(before.number, gate.corners);
+        let around = (&self.front, &self.vertices);
+        let apex = match code_apex(side, (&mut self.models.connectivity, &mut self.rings), around, gate, truth)? {
             Apex::Known(vertex) => vertex,
-            Apex::New => self.code_apex_vertex(side, before, gate)?,
+            Apex::New => self.code_apex_vertex(side, before.opposite, gate)?,
             nothing @ (Apex::Hole | Apex::Top) => {
                 if nothing == Apex::Top {
                     self.end_at_face(gate.corners)?;
                 }
-                self.front.remove(gate.face);
+                self.close_face(gate.face);
                 return Ok(());
             }
         };
@@ -288,9 +295,14 @@ impl Slab {
         self.attach(side, [a, b, c, apex], Some(gate.face))
     }
 
+    fn close_face(&mut self, face: u32) {
+        self.front.remove(&mut self.vertices, face);
+        self.fan.close(face);
+    }
+
     /// The slab ends at the t of this face.
     fn end_at_face(&mut self, corners: [VertexId; 3]) -> Result<(), MeshFault> {
-        let [t, second, third] = corners.map(|v| self.mesh.positions[v.index()].z);
+        let [t, second, third] = corners.map(|v| self.vertices.position(v).z);
         let bits = self.bounds.domain.subpixel_bits;
         for found in [second, third, t >> bits << bits] {
             if found != t {
@@ -302,19 +314,22 @@ impl Slab {
 
     /// Whether the face lies on a side of the box, as far as its sides are known.
     fn is_walled(&self, corners: [VertexId; 3]) -> bool {
-        let far = self.bounds.far();
-        let [a, b, c] = corners.map(|v| self.mesh.positions[v.index()]);
-        let all_at = |axis: usize, place: i32| a[axis] == place && b[axis] == place && c[axis] == place;
-        (0..3).any(|axis| all_at(axis, 0))
-            || (0..2).any(|axis| all_at(axis, far[axis]))
-            || (self.bounds.top_known && all_at(2, far.z))
+        let [a, b, c] = corners.map(|v| &self.vertices[v]);
+        if a.sides & b.sides & c.sides != 0 {
+            return true;
+        }
+        let top = self.bounds.far().z;
+        self.bounds.top_known && [a, b, c].iter().all(|v| v.position.z == top)
     }
 
     /// Codes the new vertex behind a gate.
-    fn code_apex_vertex(&mut self, side: &mut impl Side, before: u32, gate: &Gate) -> Result<VertexId, MeshFault> {
-        let corners = self.corners[before as usize];
-        let opposite = corners.into_iter().find(|v| !gate.corners.contains(v)).unwrap_or(corners[0]);
-        let at = |v: VertexId| self.mesh.positions[v.index()];
+    fn code_apex_vertex(
+        &mut self,
+        side: &mut impl Side,
+        opposite: VertexId,
+        gate: &Gate,
+    ) -> Result<VertexId, MeshFault> {
+        let at = |v: VertexId| self.vertices.position(v);
         let behind = Behind {
             gate: gate.corners.map(at),
             opposite: at(opposite),
@@ -350,11 +365,7 @@ impl Slab {
         let pinned = self.models.positions.code_pinned(side, pinned);
         let vertex = self.mesh.push_vertex(position);
         self.mesh.pinned[vertex.index()] = pinned;
-        self.front.push_vertex();
-        self.wedge_head.push(NONE);
-        self.stars.push_vertex();
-        self.extents.push_vertex();
-        self.passed_on.push((u8::MAX, 0));
+        self.vertices.push(position, self.bounds.sides(position));
         let frame = (position.z >> self.bounds.domain.subpixel_bits) as u32;
         self.hops.push_vertex(frame);
         if !self.bounds.top_known {
@@ -399,32 +410,43 @@ impl Slab {
         if tet >= self.limits.max_tets {
             return Err(MeshFault::TooMany { field: "tets", limit: self.limits.max_tets });
         }
-        let positions = corners.map(|v| self.mesh.positions[v.index()]);
+        let positions = corners.map(|v| self.vertices.position(v));
         self.check_positive(volume6(positions[0], positions[1], positions[2], positions[3]))?;
-        let is_new = gate.is_some() && self.stars.count(corners[3]) == 0;
-        let facing = [0, 1, 2, 3].map(|face| match gate {
+        let is_new = gate.is_some() && self.vertices[corners[3]].star.count == 0;
+        let met = [0, 1, 2, 3].map(|face| match gate {
             // The gate is face 3, opposite the apex; a new apex has no other open face.
-            Some(_) if face == 3 => gate,
-            Some(_) if is_new => None,
-            _ => self.front.facing(FACES[face].map(|c| corners[c])),
+            Some(_) if face == 3 => Met { mirrored: gate, is_there: false },
+            Some(_) if is_new => Met::NOTHING,
+            _ => self.front.meet(&self.vertices, FACES[face].map(|c| corners[c])),
         });
         side.enter(Part::Labels);
-        let label = self.code_tet_label(side, corners, gate, facing)?;
+        let label = self.code_tet_label(side, corners, gate, met.map(|met| met.mirrored))?;
         let wedges = self.code_wedges(side, corners, label)?;
         self.mesh.tets.push(wedges);
         self.corners.push(corners);
-        self.stars.push_tet(tet, corners);
-        self.extents.learn(corners, positions);
-        for (face, closed) in FACES.into_iter().zip(facing) {
-            let corners = face.map(|c| corners[c]);
-            match closed {
-                Some(closed) => self.front.remove(closed),
-                None if self.is_walled(corners) => {}
-                None => {
-                    let scale = self.extents.around(corners).as_dvec3() / f64::from(3 * PARTS);
-                    self.front.insert(corners, unit_normal(face.map(|c| positions[c]), scale), tet)?;
-                }
+        self.told.push(u8::MAX);
+        for vertex in corners {
+            self.stars.push(&mut self.vertices[vertex].star, tet);
+        }
+        extents::learn(&mut self.vertices, corners, positions);
+        for (lacking, (face, met)) in FACES.into_iter().zip(met).enumerate() {
+            if let Some(closed) = met.mirrored {
+                self.close_face(closed);
+                continue;
             }
+            let face_corners = face.map(|c| corners[c]);
+            if self.is_walled(face_corners) {
+                continue;
+            }
+            if met.is_there {
+                return Err(MeshFault::DuplicateFace { face: face_corners.map(|v| v.0) });
+            }
+            let scale = extents::around(&self.vertices, face_corners).as_dvec3() / f64::from(3 * PARTS);
+            let plane = plane(face.map(|c| positions[c]));
+            let normal = unit_normal(plane, scale);
+            let behind = CodedTet { number: tet, label, opposite: corners[lacking] };
+            let opened = self.front.insert(&mut self.vertices, face_corners, normal, behind);
+            self.fan.open(face_corners, opened, normal, plane);
         }
         side.tet_coded();
         Ok(())

@@ -5,21 +5,23 @@
 use crate::bitstream::MeshFault;
 use glam::Vec3;
 
-use crate::bitstream::colors::{Around, code_color, from_grains};
+use crate::bitstream::colors::{Around, KnownColor, code_color, from_grains};
+use crate::bitstream::extents::size_of;
 use crate::bitstream::labels::{LabelContext, code_label};
+use crate::bitstream::vertices::Wedges;
 use crate::mesh::{VertexId, Wedge, WedgeId};
 use crate::video::Label;
 
 use super::{Side, Slab};
 
 /// Labels that may meet at one vertex; bounds the time to find one of its wedges.
-const MAX_WEDGES_A_VERTEX: usize = 1 << 8;
+const MAX_WEDGES_A_VERTEX: u16 = 1 << 8;
 
 /// Wedges of a corner that are looked at to find candidates for a label.
 const LABEL_SCAN: usize = 8;
 
 /// Tets around a vertex that are looked at to predict a colour.
-const STAR_SCAN: usize = 256;
+const STAR_SCAN: u32 = 256;
 
 impl Slab {
     /// Codes the label of the tet with these corners; `facing` are the open faces that it will close.
@@ -30,7 +32,7 @@ impl Slab {
         gate: Option<u32>,
         facing: [Option<u32>; 4],
     ) -> Result<u32, MeshFault> {
-        let label_of = |face: u32| self.mesh.tet_label(self.front.face(face).tet as usize).0;
+        let label_of = |face: u32| self.front.face(face).behind.label;
         let mut context = LabelContext { before: gate.map(label_of), ..LabelContext::default() };
         for other in facing.into_iter().flatten().filter(|&face| Some(face) != gate) {
             if Some(label_of(other)) == context.before {
@@ -43,9 +45,12 @@ impl Slab {
         let mut others = [(0, 0); 4 * LABEL_SCAN];
         let mut length = 0;
         for (corner, vertex) in corners.into_iter().enumerate() {
-            let mut wedges = 0;
-            for label in self.wedges_at(vertex).take(LABEL_SCAN).map(|w| self.mesh.wedges[w].label.0) {
-                wedges += 1;
+            let known = self.vertices[vertex].wedges;
+            context.boundary_corners += usize::from(corner < 3 && known.count > 1);
+            if known.count == 1 && Some(known.label) == context.before {
+                continue;
+            }
+            for (_, label) in self.wedges_at(vertex).take(LABEL_SCAN) {
                 if Some(label) == context.before {
                     continue;
                 }
@@ -57,7 +62,6 @@ impl Slab {
                     }
                 }
             }
-            context.boundary_corners += usize::from(corner < 3 && wedges > 1);
         }
         others[..length].sort_unstable_by_key(|&(label, count)| (u32::MAX - count, label));
         context.candidates = &others[..length];
@@ -70,14 +74,25 @@ impl Slab {
         Ok(label)
     }
 
-    /// Wedges of `vertex`, the youngest first.
-    fn wedges_at(&self, vertex: VertexId) -> impl Iterator<Item = usize> + '_ {
-        let mut wedge = self.wedge_head[vertex.index()];
+    /// Wedges of `vertex` and their labels, the youngest first.
+    fn wedges_at(&self, vertex: VertexId) -> impl Iterator<Item = (u32, u32)> + '_ {
+        let Wedges { youngest, label, .. } = self.vertices[vertex].wedges;
+        let mut next = (youngest, label);
         std::iter::from_fn(move || {
-            let found = wedge as usize;
-            wedge = *self.wedge_next.get(found)?;
+            let found = next;
+            let older = *self.wedge_next.get(found.0 as usize)?;
+            next = (older, self.mesh.wedges.get(older as usize).map_or(0, |wedge| wedge.label.0));
             Some(found)
         })
+    }
+
+    /// The wedge of `vertex` that has this label.
+    fn wedge_of(&self, vertex: VertexId, label: u32) -> Option<u32> {
+        let known = self.vertices[vertex].wedges;
+        if known.count > 0 && known.label == label {
+            return Some(known.youngest);
+        }
+        self.wedges_at(vertex).find(|&(_, other)| other == label).map(|(wedge, _)| wedge)
     }
 
     /// The tet's wedges; codes the colours of those that do not exist yet.
@@ -89,10 +104,9 @@ impl Slab {
     ) -> Result<[WedgeId; 4], MeshFault> {
         let mut wedges = [None; 4];
         for (slot, vertex) in wedges.iter_mut().zip(corners) {
-            let mut looked_at = 0;
-            *slot = self.wedges_at(vertex).inspect(|_| looked_at += 1).find(|&w| self.mesh.wedges[w].label.0 == label);
-            if slot.is_none() && looked_at >= MAX_WEDGES_A_VERTEX {
-                return Err(MeshFault::TooMany { field: "labels at a vertex", limit: MAX_WEDGES_A_VERTEX as u32 });
+            *slot = self.wedge_of(vertex, label);
+            if slot.is_none() && self.vertices[vertex].wedges.count >= MAX_WEDGES_A_VERTEX {
+                return Err(MeshFault::TooMany { field: "labels at a vertex", limit: MAX_WEDGES_A_VERTEX.into() });
             }
         }
         for (slot, vertex) in wedges.iter_mut().zip(corners) {
@@ -101,33 +115,34 @@ impl Slab {
                 side.wedge_made(vertex);
             }
         }
-        Ok(wedges.map(|w| WedgeId(w.unwrap_or(0) as u32)))
+        Ok(wedges.map(|w| WedgeId(w.unwrap_or(0))))
     }
 
-    fn push_wedge(&mut self, vertex: VertexId, label: u32) -> Result<usize, MeshFault> {
+    fn push_wedge(&mut self, vertex: VertexId, label: u32) -> Result<u32, MeshFault> {
         if self.mesh.wedges.len() >= self.limits.max_wedges as usize {
             return Err(MeshFault::TooMany { field: "wedges", limit: self.limits.max_wedges });
         }
         let wedge = self.mesh.push_wedge(Wedge { vertex, label: Label(label), color: Vec3::ZERO });
-        self.wedge_next.push(std::mem::replace(&mut self.wedge_head[vertex.index()], wedge.0));
+        let known = &mut self.vertices[vertex].wedges;
+        self.wedge_next.push(known.youngest);
+        *known = Wedges { youngest: wedge.0, label, count: known.count + 1 };
         match self.last_wedge.get_mut(label as usize) {
             Some(last) => *last = wedge.0,
             None => self.last_wedge.push(wedge.0),
         }
-        Ok(wedge.index())
+        Ok(wedge.0)
     }
 
     /// Codes the colours of all wedges that have none yet.
     pub(super) fn code_colors(&mut self, side: &mut impl Side) -> Result<(), MeshFault> {
-        for wedge in self.colors.len()..self.mesh.wedges.len() {
+        for wedge in self.known.len()..self.mesh.wedges.len() {
             side.check()?;
             let around = self.around(wedge);
-            let step = self.color_steps.at(self.extents.size(self.mesh.wedges[wedge].vertex));
+            let step = self.color_steps.at(size_of(self.vertices[self.mesh.wedges[wedge].vertex].extent));
             let truth = side.color(wedge, step);
             let (color, misses) = code_color(side, &mut self.models.colors, &around, step, truth)?;
             self.mesh.wedges[wedge].color = from_grains(color);
-            self.colors.push(color);
-            self.misses.push(misses);
+            self.known.push(KnownColor::new(color, misses));
         }
         Ok(())
     }
@@ -136,16 +151,18 @@ impl Slab {
     fn around(&self, wedge: usize) -> Around {
         let mut around = Around::default();
         let Wedge { vertex, .. } = self.mesh.wedges[wedge];
-        for tet in self.stars.at(vertex).take(STAR_SCAN) {
-            let wedges = self.mesh.tets[tet as usize];
-            if wedges.iter().any(|w| w.index() == wedge) {
-                for other in wedges.into_iter().filter(|w| w.index() < wedge) {
-                    around.add(self.colors[other.index()], self.misses[other.index()]);
-                }
+        for tet in self.stars.runs(self.vertices[vertex].star, STAR_SCAN).flatten() {
+            let wedges = self.mesh.tets[*tet as usize].map(WedgeId::index);
+            if !wedges.contains(&wedge) {
+                continue;
+            }
+            // Taken in as nothing, not passed over: whether a wedge is known is as good as random.
+            for other in wedges {
+                around.add(self.known.get(other).copied().unwrap_or_default());
             }
         }
         if around.is_empty() && wedge > 0 {
-            around.add(self.colors[wedge - 1], [0; 2]);
+            around.add(self.known[wedge - 1].without_misses());
         }
         around
     }
