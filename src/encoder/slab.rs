@@ -134,6 +134,9 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             duration: EncoderConfig::KEY_INT_MAX.end() + 1,
             subpixel_bits: header.subpixel_bits,
         };
+        // Stages need the whole slab in the window, and a number of vertices to come to.
+        let has_stages = config.kept_frames() == u32::MAX && config.target_error <= 0.0;
+        let refits = if has_stages { config.refits } else { 0 };
         Ok(Self {
             ratio: config.simplification_ratio,
             target_error: config.target_error,
@@ -141,8 +144,8 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             proof: Proof::new(config),
             kept: config.kept_frames(),
             batch: config.window,
-            refits: config.refits,
-            run_ratio: RUN_RATIO.max(refits::first_stage(config.refits)),
+            refits,
+            run_ratio: RUN_RATIO.max(refits::first_stage(refits)),
             simplify_params: SimplifyParams {
                 max_extent_frames: config.window,
                 topology: config.topology,
@@ -156,8 +159,6 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             fit_params: FitParams {
                 subdivision_levels: config.subdivision_levels,
                 position_iterations: config.position_steps,
-                // Where only colours are fitted, nothing fits between the centres.
-                quarter_weight: if config.position_steps == 0 { 0.0 } else { FitParams::default().quarter_weight },
                 ..FitParams::default()
             },
             work: WorkMesh::new(domain),
@@ -241,12 +242,9 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             }
             return Ok(Vec::new());
         }
-        let has_stages = is_whole && !self.is_steered();
-        if has_stages {
-            self.refit(unfrozen, goal.vertices, observer)?;
-        }
+        self.refit(unfrozen, goal.vertices, observer)?;
         observer.tell(Event::Began(Stage::Simplify));
-        if has_stages {
+        if is_whole && !self.is_steered() {
             for pass in &WINDOW_PASSES {
                 self.simplify_blocks(unfrozen, (pass.ratio * goal.vertices as f64) as usize, pass.shift, observer);
             }

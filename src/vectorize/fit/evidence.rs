@@ -58,6 +58,7 @@ impl Evidence {
         });
         inside + self.edges.energy(model, &nodes)
     }
+
     /// The root mean square error inside of a tet, a mean over all pixels that no boundary passes.
     pub(super) fn error_within_tets(&self, model: &Model, wedge_colors: &[Vec3]) -> f64 {
         let nodes = model.node_colors(wedge_colors);

@@ -40,6 +40,7 @@ use crate::video::{LabelPlane, Volume};
 use boundary::BoundaryPoints;
 use color::Colors;
 use evidence::Evidence;
+use guard::Guard;
 use model::Model;
 use patch::Patch;
 
@@ -102,6 +103,8 @@ struct Fitting<'a> {
     frames: &'a Volume,
     params: &'a FitParams,
     report: FitReport,
+    /// What the frames say at the present positions, if they have been looked at, and the quarters' weight in it.
+    seen: Option<(Evidence, f32)>,
 }
 
 impl<'a> Fitting<'a> {
@@ -111,7 +114,8 @@ impl<'a> Fitting<'a> {
         let patch = Patch::around(request.mesh, request.free, RINGS);
         let model = Model::new(&patch.mesh, &patch.free, params.subdivision_levels);
         let colors = Colors::new(patch.mesh.wedges.iter().map(|w| w.color).collect(), &patch.free_wedges());
-        Ok(Self { patch, model, colors, frames: request.frames, params, report: FitReport::default() })
+        let (frames, report) = (request.frames, FitReport::default());
+        Ok(Self { patch, model, colors, frames, params, report, seen: None })
     }
 
     fn surfaces(&mut self, labels: &[(u32, LabelPlane)]) {
@@ -127,11 +131,12 @@ impl<'a> Fitting<'a> {
     }
 
     fn first_colors(&mut self) {
-        let evidence = self.gather();
+        let evidence = self.look(0.0);
         self.report.pixels = evidence.pixels();
         self.report.rms_before = self.rms(&evidence);
         self.colors.optimize(&self.model, &evidence, self.params.color_iterations, self.params);
         self.report.rms_colors = self.rms(&evidence);
+        self.seen = Some((evidence, 0.0));
     }
 
     /// Half of the steps without quarters of pixels, which cost as much as all else and hardly matter on the way.
@@ -139,12 +144,16 @@ impl<'a> Fitting<'a> {
         let all = self.params.position_iterations;
         let rough = FitParams { position_iterations: all / 2, quarter_weight: 0.0, ..self.params.clone() };
         let fine = FitParams { position_iterations: all - all / 2, ..self.params.clone() };
-        for params in [rough, fine] {
+        let guard = Guard::new(&self.patch.mesh, self.params.minimum_altitude);
+        for params in [rough, fine].iter().filter(|params| params.position_iterations > 0) {
+            let evidence = self.look(params.quarter_weight);
             let (patch, model, colors) = (&mut self.patch, &self.model, &mut self.colors);
-            let (evidence, refined) = refine::optimize_positions(patch, model, colors, self.frames, &params);
+            let (evidence, refined) =
+                refine::optimize_positions(patch, (model, &guard), colors, evidence, self.frames, params);
             self.report.position_steps += refined.steps;
             self.report.refused_moves += refined.refused;
             self.report.rms_positions = self.rms(&evidence);
+            self.seen = Some((evidence, params.quarter_weight));
             self.follow_positions();
         }
     }
@@ -169,7 +178,9 @@ impl<'a> Fitting<'a> {
     }
 
     fn final_colors(&mut self) {
-        let evidence = self.gather();
+        // Where positions stay nothing can fit the quarters.
+        let quarter_weight = if self.params.position_iterations > 0 { self.params.quarter_weight } else { 0.0 };
+        let evidence = self.look(quarter_weight);
         self.colors.optimize(&self.model, &evidence, self.params.color_iterations, self.params);
         self.report.rms_after = self.rms(&evidence);
         self.report.rms_within_tets = evidence.error_within_tets(&self.model, &self.colors.now);
@@ -181,15 +192,24 @@ impl<'a> Fitting<'a> {
         self.report
     }
 
-    /// Which diagonal splits a tet's octahedron follows from positions, and masks from pins.
+    /// Which diagonal splits a tet's octahedron follows from positions, and masks from pins; level 0 has neither.
     fn follow_positions(&mut self) {
-        self.model = Model::new(&self.patch.mesh, &self.patch.free, self.params.subdivision_levels);
+        if self.params.subdivision_levels > 0 {
+            self.model = Model::new(&self.patch.mesh, &self.patch.free, self.params.subdivision_levels);
+            self.seen = None;
+        }
     }
 
-    fn gather(&self) -> Evidence {
+    /// What the frames say at the present positions.
+    fn look(&mut self, quarter_weight: f32) -> Evidence {
+        let memory = match self.seen.take() {
+            Some((evidence, weight)) if weight == quarter_weight => return evidence,
+            Some((evidence, _)) => evidence,
+            None => Evidence::default(),
+        };
         let points = self.model.points(&self.patch.mesh.positions);
         let colors = self.model.node_colors(&self.colors.now);
-        Evidence::default().gather(&self.model, (&points, &colors), self.frames, self.params.quarter_weight)
+        memory.gather(&self.model, (&points, &colors), self.frames, quarter_weight)
     }
 
     fn rms(&self, evidence: &Evidence) -> f64 {

@@ -16,7 +16,7 @@ use super::model::Model;
 use super::parallel;
 use super::planes::Planes;
 use super::polygon::{FLAT, Polygon, Weights};
-use super::quarters::quarter;
+use super::quarters::{color, quarter};
 use crate::video::Frame;
 
 /// Sums over the pixels of one fine tet. phi are the weights (barycentric coordinates) of a pixel's centre, and
@@ -232,10 +232,8 @@ struct Sums {
 
 impl Sums {
     fn add(&mut self, row: &[[u8; 3]], first: Vec4, reference: Vec3, along_x: Vec4) {
-        for (i, &[r, g, b]) in row.iter().enumerate() {
-            let phi = first + along_x * i as f32;
-            let color = Vec3::new(f32::from(r), f32::from(g), f32::from(b)) - reference;
-            self.add_one(phi, color, 1.0);
+        for (i, &pixel) in row.iter().enumerate() {
+            self.add_one(first + along_x * i as f32, color(pixel) - reference, 1.0);
         }
         self.pixels += row.len() as u32;
     }

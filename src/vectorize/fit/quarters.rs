@@ -23,8 +23,9 @@ pub(super) fn quarter(frame: &Frame, column: u32, row: u32) -> Vec3 {
     own + along_x * away(column) + along_y * away(row)
 }
 
+/// A pixel's colour.
 #[inline]
-fn color([r, g, b]: [u8; 3]) -> Vec3 {
+pub(super) fn color([r, g, b]: [u8; 3]) -> Vec3 {
     Vec3::new(f32::from(r), f32::from(g), f32::from(b))
 }
 

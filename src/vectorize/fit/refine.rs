@@ -32,16 +32,18 @@ const DAMPING_GOOD: f32 = 0.4;
 const DAMPING_BAD: f32 = 4.0;
 const DAMPING_RANGE: [f32; 2] = [1e-3, 1e3];
 
-/// Optimises positions and colours of `patch`; returns with the moments of the final positions.
+/// Optimises positions and colours of `patch` from what the frames say at its positions; returns what they say at the
+/// final ones.
 pub(super) fn optimize_positions(
     patch: &mut Patch,
-    model: &Model,
+    (model, guard): (&Model, &Guard),
     colors: &mut Colors,
+    evidence: Evidence,
     frames: &Volume,
     params: &FitParams,
 ) -> (Evidence, Refined) {
-    let guard = Guard::new(&patch.mesh, params.minimum_altitude);
-    let mut state = State::start(patch, model, colors.clone(), frames, params);
+    let mut state = State { colors: colors.clone(), evidence, error: 0.0 };
+    state.follow(model, params);
     let mut damping = DAMPING_START;
     let mut report = Refined::default();
     for _ in 0..params.position_iterations {
@@ -52,7 +54,8 @@ pub(super) fn optimize_positions(
         let evidence = std::mem::take(&mut state.evidence);
         let mut tried = State { colors: state.colors.clone(), evidence, error: 0.0 };
         tried.colors.add(&wish.colors);
-        tried.look(patch, model, frames, params);
+        tried.measure(patch, model, frames, params);
+        tried.follow(model, params);
         if tried.error < state.error {
             let gain = (state.error - tried.error) / state.error;
             state = tried;
@@ -91,15 +94,8 @@ struct Wish {
 }
 
 impl State {
-    fn start(patch: &Patch, model: &Model, colors: Colors, frames: &Volume, params: &FitParams) -> Self {
-        let mut state = Self { colors, evidence: Evidence::default(), error: 0.0 };
-        state.look(patch, model, frames, params);
-        state
-    }
-
-    /// Measures at the patch's positions and lets the colours follow.
-    fn look(&mut self, patch: &Patch, model: &Model, frames: &Volume, params: &FitParams) {
-        self.measure(patch, model, frames, params);
+    /// Lets the colours follow what was measured.
+    fn follow(&mut self, model: &Model, params: &FitParams) {
         self.colors.optimize(model, &self.evidence, params.color_steps_between, params);
         self.error = self.evidence.squared_error(model, &self.colors.now);
     }

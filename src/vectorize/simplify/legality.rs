@@ -177,8 +177,8 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
 
     /// Whether one of the tets around an edge has this label.
     fn is_around(&self, u: u32, v: u32, label: Label) -> bool {
-        let shared = self.stars.star(u).iter().filter(|&&t| self.tets[t as usize].contains(&v));
-        shared.into_iter().any(|&t| self.labels[t as usize] == label)
+        let mut shared = self.stars.star(u).iter().filter(|&&t| self.tets[t as usize].contains(&v));
+        shared.any(|&t| self.labels[t as usize] == label)
     }
 
     /// The link condition: a vertex next to both ends must share a tet with them. Dey, Edelsbrunner, Guha, Nekhayev,
@@ -198,7 +198,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
 }
 
 /// Marks on vertices that need no clearing.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Marks {
     of: Vec<u32>,
     last: u32,
