@@ -56,6 +56,7 @@ impl BitModel {
 }
 
 /// The range stays at or above this between decisions.
+#[cfg(feature = "encode")]
 const RANGE_MIN: u32 = 1 << 24;
 
 /// One side of the coding. Models and syntax are written once against it: the writer codes the decisions it is given
