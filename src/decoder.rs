@@ -12,7 +12,7 @@ use crate::video::Surface;
 /// How a [`Decoder`] works.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DecoderConfig {
-    /// Levels of subdivision to draw with; `None`: as the stream says.
+    /// Levels of subdivision to draw with; `None`: as the stream says. A stream made for level 0 is always drawn so.
     pub subdivision_levels: Option<u8>,
     /// Whether edges between labels are drawn smooth; without, they are stairs of pixels.
     pub antialias: bool,
@@ -221,7 +221,11 @@ fn drawing<'a>(
     if std::mem::take(&mut slab.is_behind) {
         slab.scene.extend(mesh);
     }
-    let levels = config.subdivision_levels.unwrap_or(header.subdivision_levels).min(MAX_LEVELS);
+    let levels = match (header.subdivision_levels, config.subdivision_levels) {
+        // Its packets do not bring the stars that masks need.
+        (0, _) => 0,
+        (of_stream, wanted) => wanted.unwrap_or(of_stream).min(MAX_LEVELS),
+    };
     let frame = (params.frame - slab.first_frame as f64).min(slab.last_frame);
     let RenderParams { viewport, mesh, .. } = *params;
     Ok((slab, DrawingAt { frame, params: DrawParams { levels, antialias: config.antialias, viewport, mesh } }))

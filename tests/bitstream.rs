@@ -21,8 +21,10 @@ use tetvec::bitstream::{
 use tetvec::mesh::{Domain, TetMesh, validate, volume6};
 use tetvec::video::Label;
 
-/// Rings around the vertices before t = k + 1 whose tets packet k completes.
-const RINGS: u32 = 2;
+/// Rings around the vertices before t = k + 1 whose tets packet k completes, in streams with so many levels of subdivision.
+fn rings_of(levels: u8) -> u32 {
+    if levels == 0 { 0 } else { 2 }
+}
 
 fn header_of(domain: Domain) -> SequenceHeader {
     SequenceHeader {
@@ -42,7 +44,13 @@ fn small_params(seed: u64) -> MeshParams {
 
 /// Packets of a slab of `frames` frames.
 fn write_slab(mesh: &TetMesh, first_frame: u64, frames: u32) -> Vec<Packet> {
-    let mut writer = SlabWriter::try_new(header_of(mesh.domain), first_frame).expect("a header in range");
+    write_slab_for(1, mesh, first_frame, frames)
+}
+
+/// The same for so many levels of subdivision.
+fn write_slab_for(levels: u8, mesh: &TetMesh, first_frame: u64, frames: u32) -> Vec<Packet> {
+    let header = SequenceHeader { subdivision_levels: levels, ..header_of(mesh.domain) };
+    let mut writer = SlabWriter::try_new(header, first_frame).expect("a header in range");
     writer.set_color_steps(ColorSteps::even(1)).expect("steps in range");
     let packets = (0..frames).map(|k| writer.write_packet(mesh, k + 1 == frames).expect("a tiling")).collect();
     assert!(writer.is_drained());
@@ -65,10 +73,10 @@ fn tet_keys(mesh: &TetMesh, wanted: impl Fn(usize) -> bool) -> BTreeSet<TetKey> 
 }
 
 /// Which tets the packets 0 to k of a slab bring, by the rule of docs/format.md.
-fn tets_by_hop_rule(mesh: &TetMesh, k: i32) -> Vec<bool> {
+fn tets_by_hop_rule(mesh: &TetMesh, k: i32, rings: u32) -> Vec<bool> {
     let low = (k + 1) * mesh.domain.unit();
-    let mut hop: Vec<u32> = mesh.positions.iter().map(|p| if p.z < low { 0 } else { RINGS + 1 }).collect();
-    for ring in 1..=RINGS {
+    let mut hop: Vec<u32> = mesh.positions.iter().map(|p| if p.z < low { 0 } else { rings + 1 }).collect();
+    for ring in 1..=rings {
         let before = hop.clone();
         for tet in 0..mesh.tets.len() {
             let corners = mesh.tet_vertices(tet);
@@ -77,7 +85,7 @@ fn tets_by_hop_rule(mesh: &TetMesh, k: i32) -> Vec<bool> {
             }
         }
     }
-    (0..mesh.tets.len()).map(|tet| mesh.tet_vertices(tet).iter().any(|v| hop[v.index()] <= RINGS)).collect()
+    (0..mesh.tets.len()).map(|tet| mesh.tet_vertices(tet).iter().any(|v| hop[v.index()] <= rings)).collect()
 }
 
 #[test]
@@ -87,12 +95,13 @@ fn slabs_come_back_packet_by_packet() {
         let mesh = irregular_mesh(&params);
         assert_eq!(validate(&mesh), Ok(()));
         let mut parser = SlabParser::new(Limits::default());
-        for (k, packet) in write_slab(&mesh, 100, 8).iter().enumerate() {
+        let levels = seed as u8 % 3;
+        for (k, packet) in write_slab_for(levels, &mesh, 100, 8).iter().enumerate() {
             let info = parser.parse_packet(&packet.data).expect("an undamaged packet");
             assert_eq!((info.frame_number, info.keyframe, info.last), (100 + k as u64, k == 0, k == 7));
             assert_eq!(parser.frames_complete(), k as u32 + 1);
             let parsed = parser.mesh().expect("a keyframe was parsed");
-            let in_packet = tets_by_hop_rule(&mesh, k as i32);
+            let in_packet = tets_by_hop_rule(&mesh, k as i32, rings_of(levels));
             let expected = tet_keys(&mesh, |tet| k == 7 || in_packet[tet]);
             assert_eq!(tet_keys(parsed, |_| true), expected, "packet {k} of mesh {seed}");
         }
@@ -176,7 +185,7 @@ fn real_sizes_stay_below_nine_bytes_a_vertex() {
 #[test]
 fn a_mesh_may_grow_between_packets() {
     let whole = irregular_mesh(&small_params(3));
-    let needed_by = |tet: usize, k: i32| tets_by_hop_rule(&whole, k)[tet];
+    let needed_by = |tet: usize, k: i32| tets_by_hop_rule(&whole, k, rings_of(1))[tet];
     let first_packet: Vec<i32> =
         (0..whole.tets.len()).map(|tet| (0..8).find(|&k| needed_by(tet, k)).unwrap_or(8)).collect();
     let mut order: Vec<usize> = (0..whole.tets.len()).collect();

@@ -40,7 +40,7 @@ fn write_stream(slabs: &[TetMesh], color_steps: ColorSteps) -> Vec<u8> {
             frame_rate: Fraction { numerator: 30_000, denominator: 1_001 },
             pixel_aspect_ratio: Fraction { numerator: 1, denominator: 1 },
             subpixel_bits,
-            subdivision_levels: 0,
+            subdivision_levels: u8::from(duration > 4),
         };
         let mut writer = SlabWriter::try_new(header, first_frame).expect("a header in range");
         writer.set_color_steps(color_steps).expect("steps in range");

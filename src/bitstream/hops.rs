@@ -4,24 +4,32 @@
 //! star to complete. Forbidden here: coding.
 //!
 //! Low vertices have hop 0; the others their distance from the low ones in edges. Vertices come out in the order of
-//! their hops, each with its star still to be completed, so that hops up to [`RINGS`] are exact when a packet ends.
+//! their hops, each with its star still to be completed, so that hops up to [`rings`] are exact when a packet ends.
 
 use std::collections::{BTreeMap, VecDeque};
 
 use crate::mesh::VertexId;
 
-/// Rings around the low vertices whose tets a packet brings.
-pub const RINGS: u8 = 2;
+/// Most rings that a stream can have.
+pub(crate) const MAX_RINGS: u8 = 2;
 
-/// A vertex not known to be within [`RINGS`].
+/// Rings around the low vertices whose tets a packet brings: those that the masks of so many levels of subdivision
+/// reach. Without subdivision the stars of the low vertices are all that a slice cuts.
+pub(crate) fn rings(subdivision_levels: u8) -> u8 {
+    if subdivision_levels == 0 { 0 } else { MAX_RINGS }
+}
+
+/// A vertex not known to be within the rings.
 const FAR: u8 = u8::MAX;
 
 /// Hops of all coded vertices, and what to do next.
 #[derive(Debug, Clone)]
 pub(super) struct Hops {
     hop: Vec<u8>,
+    /// [`rings`] of the stream.
+    rings: u8,
     /// Vertices to visit, by hop.
-    queues: [VecDeque<VertexId>; RINGS as usize + 1],
+    queues: [VecDeque<VertexId>; MAX_RINGS as usize + 1],
     /// Vertices that will be low in later packets, by frame.
     later: BTreeMap<u32, Vec<VertexId>>,
     /// Frames below which a vertex is low.
@@ -29,8 +37,9 @@ pub(super) struct Hops {
 }
 
 impl Hops {
-    pub(super) fn new() -> Self {
-        Self { hop: Vec::new(), queues: Default::default(), later: BTreeMap::new(), low_frames: 0 }
+    pub(super) fn new(rings: u8) -> Self {
+        let rings = rings.min(MAX_RINGS);
+        Self { hop: Vec::new(), rings, queues: Default::default(), later: BTreeMap::new(), low_frames: 0 }
     }
 
     /// From here on vertices before frame `low_frames` are low.
@@ -55,7 +64,7 @@ impl Hops {
 
     /// The next vertex to complete, and its hop.
     pub(super) fn next(&mut self) -> Option<(VertexId, u8)> {
-        for hop in 0..=RINGS {
+        for hop in 0..=self.rings {
             while let Some(vertex) = self.queues[hop as usize].pop_front() {
                 // Otherwise it was lowered since, and has been visited with the lower hop.
                 if self.hop[vertex.index()] == hop {
@@ -66,14 +75,19 @@ impl Hops {
         None
     }
 
-    /// Whether `vertex` is within [`RINGS`].
+    /// Whether a vertex with this hop has neighbours to tell.
+    pub(super) fn goes_on(&self, hop: u8) -> bool {
+        hop < self.rings
+    }
+
+    /// Whether `vertex` is within the rings.
     pub(super) fn is_near(&self, vertex: VertexId) -> bool {
-        self.hop[vertex.index()] <= RINGS
+        self.hop[vertex.index()] <= self.rings
     }
 
     /// Notes that `vertex` is at most `hop` edges away.
     pub(super) fn lower(&mut self, vertex: VertexId, hop: u8) {
-        if hop <= RINGS && hop < self.hop[vertex.index()] {
+        if hop <= self.rings && hop < self.hop[vertex.index()] {
             self.hop[vertex.index()] = hop;
             self.queues[hop as usize].push_back(vertex);
         }
@@ -93,14 +107,14 @@ mod tests {
 
     #[test]
     fn vertices_come_in_the_order_of_hops() {
-        let mut hops = Hops::new();
+        let mut hops = Hops::new(2);
         hops.begin_packet(1);
         for frame in [3, 0, 1, 0] {
             hops.push_vertex(frame);
         }
         assert_eq!(hops.next(), Some((VertexId(1), 0)));
         hops.lower(VertexId(2), 1);
-        hops.lower(VertexId(0), RINGS + 1);
+        hops.lower(VertexId(0), 3);
         assert_eq!(hops.next(), Some((VertexId(3), 0)));
         assert_eq!(hops.next(), Some((VertexId(2), 1)));
         assert_eq!(hops.next(), None);
@@ -113,7 +127,7 @@ mod tests {
 
     #[test]
     fn a_vertex_lowered_while_it_waits_is_visited_once() {
-        let mut hops = Hops::new();
+        let mut hops = Hops::new(2);
         hops.begin_packet(1);
         hops.push_vertex(5);
         hops.lower(VertexId(0), 2);

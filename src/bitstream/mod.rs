@@ -40,7 +40,9 @@ pub use framing::{
     MAGIC, PacketHeader, SEQUENCE_HEADER_BYTES, SYNC, VERSION, find_packet, parse_packet_header, parse_sequence_header,
 };
 pub use header::{Fraction, SequenceHeader};
-pub use hops::RINGS;
+#[cfg(feature = "encode")]
+pub(crate) use hops::MAX_RINGS;
+pub(crate) use hops::rings;
 #[cfg(feature = "encode")]
 pub use index::IndexWriter;
 pub use index::{Index, IndexEntry, TAIL_BYTES, index_length};

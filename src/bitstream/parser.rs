@@ -10,6 +10,7 @@ use super::colors::{ColorSteps, Grains};
 use super::connectivity::Apex;
 use super::framing::{PacketHeader, parse_packet, read_u16, read_u32};
 use super::header::check_field;
+use super::hops::rings;
 use super::range_coder::{BitCoder, BitModel, RangeDecoder};
 use super::slab::{Side, Slab, SlabParams};
 use super::{BitCounts, Limits, MeshFault, ParseError, Part, SequenceHeader};
@@ -209,6 +210,7 @@ impl OpenSlab {
             },
             max_duration: header.max_duration(&limits),
             color_steps: ColorSteps { step, size },
+            rings: rings(header.subdivision_levels),
             limits,
         });
         let open = Self { header, first_frame: packet.frame_number, packets: 0, ended: false, slab };

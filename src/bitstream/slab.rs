@@ -16,7 +16,7 @@ use super::connectivity::{Apex, ConnectivityModels, Gate, choose_gate, code_apex
 use super::extents::{self, PARTS};
 use super::fan::Fan;
 use super::front::{CodedTet, Front, Met, plane, unit_normal};
-use super::hops::{Hops, RINGS};
+use super::hops::Hops;
 use super::labels::LabelModels;
 use super::near::Rings;
 use super::positions::{Behind, Bounds, PositionModels, code_free_position, code_position};
@@ -116,6 +116,8 @@ pub(super) struct SlabParams {
     pub(super) max_duration: u32,
     /// How coarse colours are.
     pub(super) color_steps: ColorSteps,
+    /// Rings around the low vertices that a packet completes.
+    pub(super) rings: u8,
     /// Bounds on counts.
     pub(super) limits: Limits,
 }
@@ -133,7 +135,7 @@ impl Slab {
             front: Front::new(),
             fan: Fan::NEW,
             rings: Rings::default(),
-            hops: Hops::new(),
+            hops: Hops::new(params.rings),
             models: Box::new(Models {
                 connectivity: ConnectivityModels::NEW,
                 positions: PositionModels::NEW,
@@ -247,7 +249,7 @@ impl Slab {
     /// are passed over, so that all visits together are linear in the star. So are those that another vertex with as
     /// low a hop has told.
     fn pass_hop_on(&mut self, vertex: VertexId, hop: u8) {
-        if hop == RINGS {
+        if !self.hops.goes_on(hop) {
             return;
         }
         let known = &mut self.vertices[vertex];

@@ -5,6 +5,7 @@
 
 use super::colors::ColorSteps;
 use super::framing::{PacketHeader, write_packet};
+use super::hops::rings;
 use super::slab::{Slab, SlabParams};
 use super::source::{Source, Writing};
 use super::{Limits, Packet, SequenceHeader, WriteError};
@@ -56,8 +57,8 @@ impl SlabWriter {
     /// Writes the packet of the slab's next frame k (0, 1, ...), after which [k, k + 1) can be rendered.
     ///
     /// `mesh` is the slab's committed mesh. Between calls it may only grow; positions and pins of vertices and colours
-    /// of wedges that no packet has brought may still change. It must hold all tets with a vertex within two edges of
-    /// one before t = k + 1, and `mesh.domain.duration` must be final, or greater than every t in the mesh. With
+    /// of wedges that no packet has brought may still change. It must hold all tets with a vertex before t = k + 1,
+    /// in streams with subdivision also those with one within two edges of these, and `mesh.domain.duration` must be final, or greater than every t in the mesh. With
     /// `last` it must be the whole slab with its final duration, and all that is left goes out.
     ///
     /// # Errors
@@ -81,6 +82,7 @@ impl SlabWriter {
                 domain: mesh.domain,
                 max_duration: header.max_duration(&Limits::default()),
                 color_steps: self.color_steps,
+                rings: rings(header.subdivision_levels),
                 limits: Limits::default(),
             })
         });

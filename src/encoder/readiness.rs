@@ -2,22 +2,19 @@
 
 use std::collections::VecDeque;
 
-use crate::bitstream::RINGS;
 use crate::mesh::{StarTable, TetMesh, VertexId};
 
-/// Hops beyond this one are not told apart.
-pub(super) const FAR: u8 = RINGS + 2;
-
-/// Distance in edges of every vertex from those before frame `k + 1`, [`FAR`] where it is greater than `RINGS + 1`.
+/// Distance in edges of every vertex from those before frame `k + 1`, `rings + 2` where it is greater than `rings + 1`.
 ///
-/// The packets up to k hold the tets that touch a vertex within `RINGS`, and so the vertices within `RINGS + 1`.
-pub(super) fn hops(mesh: &TetMesh, stars: &StarTable, k: u32) -> Vec<u8> {
+/// The packets up to k hold the tets that touch a vertex within `rings`, and so the vertices within `rings + 1`.
+pub(super) fn hops(mesh: &TetMesh, stars: &StarTable, k: u32, rings: u8) -> Vec<u8> {
+    let far = rings + 2;
     let end = (k as i32 + 1).saturating_mul(mesh.domain.unit());
-    let mut hops: Vec<u8> = mesh.positions.iter().map(|p| if p.z < end { 0 } else { FAR }).collect();
+    let mut hops: Vec<u8> = mesh.positions.iter().map(|p| if p.z < end { 0 } else { far }).collect();
     let mut front: VecDeque<u32> = (0..hops.len() as u32).filter(|&v| hops[v as usize] == 0).collect();
     while let Some(v) = front.pop_front() {
         let next = hops[v as usize] + 1;
-        if next == FAR {
+        if next == far {
             break;
         }
         for &tet in stars.star(VertexId(v)) {

@@ -8,10 +8,10 @@ use std::sync::Arc;
 use super::observer::{Event, Observer, Stage};
 use super::proof::Proof;
 use super::quantize::{color_steps, rounded_rms};
-use super::readiness::{FAR, hops};
+use super::readiness::hops;
 use super::runs::{Run, Runs};
 use super::{EncodeError, EncoderConfig, ErrorMetric};
-use crate::bitstream::{Packet, RINGS, SlabWriter};
+use crate::bitstream::{MAX_RINGS, Packet, SlabWriter, rings};
 use crate::mesh::{Domain, StarTable, TetMesh};
 use crate::vectorize::fit::{FitParams, FitReport, FitRequest, fit};
 use crate::vectorize::lattice::AdaptiveLattice;
@@ -85,11 +85,11 @@ pub(super) trait WindowEncoder: Send {
 }
 
 /// Most frames between the arrival of a frame and its packet with windows of `window` frames: the packet's tets and
-/// those around their vertices reach `RINGS + 1` tets of at most a window each beyond it, what is committed and what is
+/// those around their vertices reach `MAX_RINGS + 1` tets of at most a window each beyond it, what is committed and what is
 /// in the lattice lag behind by less than a window each, and packets leave by the window. An adaptive lattice waits for
 /// the run after the next and for what could be too short to be one.
 pub(super) fn latency_frames(config: &EncoderConfig) -> u32 {
-    (u32::from(RINGS) + 3) * config.window + 2 * config.run_steps() + AdaptiveLattice::MIN_CUT + 2
+    (u32::from(MAX_RINGS) + 3) * config.window + 2 * config.run_steps() + AdaptiveLattice::MIN_CUT + 2
 }
 
 /// Vectorises one slab.
@@ -110,6 +110,8 @@ pub(super) struct SlabEncoder<Q> {
     fit_params: FitParams,
     work: WorkMesh<Q>,
     committed: TetMesh,
+    /// Rings around the vertices of a packet that it brings, too.
+    rings: u8,
     writer: SlabWriter,
     /// Whether the steps of colours are chosen: the slab's first fit decides.
     colors_measured: bool,
@@ -163,6 +165,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             },
             work: WorkMesh::new(domain),
             committed: TetMesh::empty(domain),
+            rings: rings(header.subdivision_levels),
             writer: SlabWriter::try_new(header, first_frame)?,
             colors_measured: false,
             runs: Runs::new(domain, config),
@@ -300,8 +303,8 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let stars = StarTable::new(&self.committed);
         let incomplete = self.work.committed_vertices();
         let is_ready = |k: u32| {
-            let hops = hops(&self.committed, &stars, k);
-            !self.committed.positions.is_empty() && incomplete.iter().all(|&v| hops[v as usize] > RINGS)
+            let hops = hops(&self.committed, &stars, k, self.rings);
+            !self.committed.positions.is_empty() && incomplete.iter().all(|&v| hops[v as usize] > self.rings)
         };
         let end = match frames {
             Some(frames) => frames,
@@ -331,7 +334,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         if self.sent == 0 {
             return vec![true; self.committed.positions.len()];
         }
-        hops(&self.committed, stars, self.sent - 1).into_iter().map(|hop| hop >= FAR).collect()
+        hops(&self.committed, stars, self.sent - 1, self.rings).into_iter().map(|hop| hop > self.rings + 1).collect()
     }
 
     /// Fits what is unsent.

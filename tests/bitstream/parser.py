@@ -186,7 +186,8 @@ class Slab:
         self.by_corners = {}
         # Hops
         self.hops = []
-        self.queues = (deque(), deque(), deque())
+        self.rings = 2 if header["levels"] else 0
+        self.queues = tuple(deque() for _ in range(self.rings + 1))
         self.passed_on = {}
         self.slopes = {name: Slope() for name in ("rg", "bg", "br")}
 
@@ -216,7 +217,7 @@ class Slab:
         return self.low is None or self.positions[v][2] < self.low
 
     def lower(self, v, hop):
-        if hop <= 2 and hop < self.hops[v]:
+        if hop <= self.rings and hop < self.hops[v]:
             self.hops[v] = hop
             self.queues[hop].append(v)
 
@@ -229,7 +230,7 @@ class Slab:
         return None
 
     def pass_hop_on(self, v, hop):
-        if hop == 2:
+        if hop == self.rings:
             return
         told, count = self.passed_on.get(v, (None, 0))
         start = count if told == hop else 0
@@ -253,7 +254,7 @@ class Slab:
                 corners.append(self.push_vertex(position))
         self.attach(tuple(corners), None)
         for v in corners:
-            if self.hops[v] <= 2:
+            if self.hops[v] <= self.rings:
                 self.queues[self.hops[v]].append(v)
 
     def push_vertex(self, position):

@@ -269,7 +269,10 @@ impl ObjectImpl for TetvecDec {
             properties.extend([
                 glib::ParamSpecInt::builder("subdivision-levels")
                     .nick("Subdivision levels")
-                    .blurb("Levels of subdivision to draw with: more is smoother and slower (-1 = as the stream says)")
+                    .blurb(concat!(
+                        "Levels of subdivision to draw with: more is smoother and slower (-1 = as the stream says); ",
+                        "a stream made for 0 levels has no more"
+                    ))
                     .minimum(LEVELS_OF_STREAM)
                     .maximum(i32::from(*EncoderConfig::SUBDIVISION_LEVELS.end()))
                     .default_value(default.subdivision_levels)
