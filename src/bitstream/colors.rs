@@ -54,6 +54,7 @@ impl ColorSteps {
     }
 
     /// Whether both numbers are in range.
+    #[cfg(feature = "encode")]
     pub(super) fn is_valid(self) -> bool {
         let [low, high] = Self::STEPS;
         (low..=high).contains(&self.step) && self.size <= Self::SIZES[1]

@@ -41,8 +41,7 @@ pub use framing::{
 };
 pub use header::{Fraction, SequenceHeader};
 #[cfg(feature = "encode")]
-pub(crate) use hops::MAX_RINGS;
-pub(crate) use hops::rings;
+pub(crate) use hops::{MAX_RINGS, rings};
 #[cfg(feature = "encode")]
 pub use index::IndexWriter;
 pub use index::{Index, IndexEntry, TAIL_BYTES, index_length};
