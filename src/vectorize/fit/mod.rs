@@ -27,6 +27,7 @@ mod planes;
 mod polygon;
 mod quarters;
 mod refine;
+mod smoothness;
 mod sparse;
 mod surface;
 #[cfg(test)]
@@ -39,7 +40,7 @@ use crate::mesh::TetMesh;
 use crate::video::{LabelPlane, Volume};
 use boundary::BoundaryPoints;
 use color::Colors;
-use evidence::Evidence;
+use evidence::{Beside, Evidence};
 use guard::Guard;
 use model::Model;
 use patch::Patch;
@@ -103,8 +104,8 @@ struct Fitting<'a> {
     frames: &'a Volume,
     params: &'a FitParams,
     report: FitReport,
-    /// What the frames say at the present positions, if they have been looked at, and the quarters' weight in it.
-    seen: Option<(Evidence, f32)>,
+    /// What the frames say at the present positions, if they have been looked at.
+    seen: Option<Evidence>,
 }
 
 impl<'a> Fitting<'a> {
@@ -136,7 +137,7 @@ impl<'a> Fitting<'a> {
         self.report.rms_before = self.rms(&evidence);
         self.colors.optimize(&self.model, &evidence, self.params.color_iterations, self.params);
         self.report.rms_colors = self.rms(&evidence);
-        self.seen = Some((evidence, 0.0));
+        self.seen = Some(evidence);
     }
 
     /// Half of the steps without quarters of pixels, which cost as much as all else and hardly matter on the way.
@@ -153,7 +154,7 @@ impl<'a> Fitting<'a> {
             self.report.position_steps += refined.steps;
             self.report.refused_moves += refined.refused;
             self.report.rms_positions = self.rms(&evidence);
-            self.seen = Some((evidence, params.quarter_weight));
+            self.seen = Some(evidence);
             self.follow_positions();
         }
     }
@@ -183,7 +184,8 @@ impl<'a> Fitting<'a> {
         let evidence = self.look(quarter_weight);
         self.colors.optimize(&self.model, &evidence, self.params.color_iterations, self.params);
         self.report.rms_after = self.rms(&evidence);
-        self.report.rms_within_tets = evidence.error_within_tets(&self.model, &self.colors.now);
+        let points = self.model.points(&self.patch.mesh.positions);
+        self.report.rms_within_tets = evidence.error_within_tets(&self.model, &points, &self.colors.now);
     }
 
     fn finish(mut self, mesh: &mut TetMesh) -> FitReport {
@@ -202,18 +204,19 @@ impl<'a> Fitting<'a> {
 
     /// What the frames say at the present positions.
     fn look(&mut self, quarter_weight: f32) -> Evidence {
+        let beside = Beside { quarter: quarter_weight, ..self.params.beside() };
         let memory = match self.seen.take() {
-            Some((evidence, weight)) if weight == quarter_weight => return evidence,
-            Some((evidence, _)) => evidence,
-            None => Evidence::default(),
+            Some(evidence) if evidence.beside == beside => return evidence,
+            other => other.unwrap_or_default(),
         };
         let points = self.model.points(&self.patch.mesh.positions);
         let colors = self.model.node_colors(&self.colors.now);
-        memory.gather(&self.model, (&points, &colors), self.frames, quarter_weight)
+        memory.gather(&self.model, (&points, &colors), self.frames, beside)
     }
 
     fn rms(&self, evidence: &Evidence) -> f64 {
         let values = (3.0 * evidence.weight()).max(1.0);
-        (evidence.squared_error(&self.model, &self.colors.now) / values).sqrt()
+        let points = self.model.points(&self.patch.mesh.positions);
+        (evidence.error_of_pixels(&self.model, &points, &self.colors.now) / values).sqrt()
     }
 }

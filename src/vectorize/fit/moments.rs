@@ -11,12 +11,14 @@ use std::ops::Range;
 use glam::{DVec3, IVec3, Mat3, Vec3, Vec4};
 
 use super::edges::Piece;
+use super::evidence::Beside;
 use super::marks::Marks;
 use super::model::Model;
 use super::parallel;
 use super::planes::Planes;
 use super::polygon::{FLAT, Polygon, Weights};
 use super::quarters::{color, quarter};
+use super::smoothness::{Gram, gradient_form};
 use crate::video::Frame;
 
 /// Sums over the pixels of one fine tet. phi are the weights (barycentric coordinates) of a pixel's centre, and
@@ -27,12 +29,12 @@ pub(super) struct Moments {
     pub(super) tet: u32,
     /// Number of pixels.
     pub(super) pixels: u32,
-    /// What they count, and their quarters; 0 where all sums are.
+    /// What they count, and their quarters.
     pub(super) weight: f32,
     /// The colour that sums are relative to.
     reference: Vec3,
-    /// Sum of phi phi^T: 00, 11, 22, 33, 01, 02, 03, 12, 13, 23.
-    gram: [f32; 10],
+    /// Sum of phi phi^T, and what gradients cost.
+    gram: Gram,
     /// Sum of phi_i times colour.
     rhs: [Vec3; 4],
     /// Sum of squared colour.
@@ -63,7 +65,7 @@ impl Moments {
         std::array::from_fn(|i| self.rhs[i] - w[i])
     }
 
-    /// Sum of |frame - model|^2 over pixels and channels, for the corner colours `colors`.
+    /// Sum of |frame - model|^2 over pixels and channels, and what the gradient costs, for the corner colours `colors`.
     pub(super) fn energy(&self, colors: [Vec3; 4]) -> f64 {
         let u = colors.map(|c| c - self.reference);
         let w = self.product(u);
@@ -80,8 +82,8 @@ pub(super) struct View<'a> {
     pub(super) planes: Planes<'a>,
     /// Pixels that are taken whole and not at their centres.
     pub(super) marks: &'a Marks,
-    /// What a quarter of a pixel counts beside its centre.
-    pub(super) quarter_weight: f32,
+    /// What counts beside the centres.
+    pub(super) beside: Beside,
 }
 
 /// The moments of all of the model's tets, in their order, over the pixels that are not marked. `points` are the model's
@@ -99,8 +101,12 @@ pub(super) fn measure(
         let nodes = model.tets[tet].map(|n| n as usize);
         let corners = nodes.map(|n| points[model.node_point[n] as usize]);
         let reference = nodes.iter().map(|&n| colors[n]).sum::<Vec3>() * 0.25;
-        let empty = Moments { tet: tet as u32, ..Moments::default() };
-        view.moments(tet as u32, corners, reference).unwrap_or(empty)
+        let empty = Moments { tet: tet as u32, reference, ..Moments::default() };
+        let mut moments = view.moments(tet as u32, corners, reference).unwrap_or(empty);
+        if let Some(form) = gradient_form(corners, model.fine_unit, view.beside.gradient) {
+            moments.gram.iter_mut().zip(form).for_each(|(sum, entry)| *sum += entry);
+        }
+        moments
     });
     buffer
 }
@@ -158,7 +164,7 @@ impl View<'_> {
                     marks.unmarked(y, from..to, |run| add(y, run.start, run.end));
                 }),
             }
-            if self.quarter_weight > 0.0 {
+            if self.beside.quarter > 0.0 {
                 self.add_quarters(&mut sums, (k, frame), &polygon.enlarged(2.0), &weights, reference);
             }
         }
@@ -183,7 +189,7 @@ impl View<'_> {
                 let column = 2 * x + ((row ^ x ^ (row / 2)) & 1);
                 if columns.contains(&column) {
                     let phi = first + along_x * (column - columns.start) as f32;
-                    sums.add_one(phi, quarter(frame, column, row) - reference, self.quarter_weight);
+                    sums.add_one(phi, quarter(frame, column, row) - reference, self.beside.quarter);
                 }
             }
         };

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::evidence::Beside;
 use super::pin::PinReport;
 use crate::mesh::TetMesh;
 use crate::video::{LabelPlane, Volume};
@@ -34,6 +35,9 @@ pub struct FitParams {
     /// What a quarter of a pixel counts beside the pixel's centre: what lies between centres is seen when the picture is
     /// enlarged. 0: it does not count.
     pub quarter_weight: f32,
+    /// What the squared gradient of colour, in (levels / pixel)^2, costs over a pixel and a frame beside the squared error
+    /// there: it decides where no pixel does. 0: nothing.
+    pub gradient_weight: f32,
 
     /// Steps of the position optimisation; 0: positions stay.
     pub position_iterations: u32,
@@ -64,6 +68,7 @@ impl Default for FitParams {
             color_steps_between: 3,
             color_anchor: 0.05,
             quarter_weight: 0.1,
+            gradient_weight: 0.003,
             position_iterations: 12,
             position_cg_iterations: 1,
             position_stiffness: 1.0,
@@ -75,12 +80,18 @@ impl Default for FitParams {
 }
 
 impl FitParams {
+    /// What counts beside the centres of pixels.
+    pub(super) fn beside(&self) -> Beside {
+        Beside { quarter: self.quarter_weight, gradient: self.gradient_weight }
+    }
+
     fn check(&self) -> Result<(), FitError> {
         expect("subdivision_levels", "0 to 2", self.subdivision_levels, (0..=2).contains(&self.subdivision_levels))?;
         let not_negative = [
             ("laplacian_weight", self.laplacian_weight),
             ("surface_reach_px", self.surface_reach_px),
             ("quarter_weight", self.quarter_weight),
+            ("gradient_weight", self.gradient_weight),
             ("position_stiffness", self.position_stiffness),
             ("max_step_px", self.max_step_px),
             ("minimum_altitude", self.minimum_altitude),

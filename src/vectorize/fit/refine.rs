@@ -104,7 +104,7 @@ impl State {
         let points = model.points(&patch.mesh.positions);
         let evidence = std::mem::take(&mut self.evidence);
         let colors = model.node_colors(&self.colors.now);
-        self.evidence = evidence.gather(model, (&points, &colors), frames, params.quarter_weight);
+        self.evidence = evidence.gather(model, (&points, &colors), frames, params.beside());
     }
 
     fn step(&self, patch: &Patch, model: &Model, params: &FitParams, damping: f32) -> Wish {
