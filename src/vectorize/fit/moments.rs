@@ -171,8 +171,7 @@ impl View<'_> {
         sums.finish(tet, reference)
     }
 
-    /// Adds the quarters whose middles lie in a slice (in units of half a pixel), of pixels that are not marked: two of each
-    /// pixel, on the diagonal that its neighbours do not have.
+    /// Adds the quarters whose middles lie in a slice (in units of half a pixel), of pixels that are not marked.
     fn add_quarters(
         &self,
         sums: &mut Sums,
@@ -185,12 +184,9 @@ impl View<'_> {
         let mut add = |row: u32, columns: Range<u32>| {
             let middle = |n: u32| 0.5 * (f64::from(n) + 0.5);
             let first = weights.at(DVec3::new(middle(columns.start), middle(row), plane));
-            for x in columns.start / 2..columns.end.div_ceil(2) {
-                let column = 2 * x + ((row ^ x ^ (row / 2)) & 1);
-                if columns.contains(&column) {
-                    let phi = first + along_x * (column - columns.start) as f32;
-                    sums.add_one(phi, quarter(frame, column, row) - reference, self.beside.quarter);
-                }
+            for (i, column) in columns.enumerate() {
+                let phi = first + along_x * i as f32;
+                sums.add_one(phi, quarter(frame, column, row) - reference, self.beside.quarter);
             }
         };
         polygon.spans(2 * frame.width(), 2 * frame.height(), |row, from, to| match self.marks.frame(k) {

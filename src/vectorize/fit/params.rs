@@ -67,7 +67,7 @@ impl Default for FitParams {
             color_iterations: 30,
             color_steps_between: 3,
             color_anchor: 0.05,
-            quarter_weight: 0.1,
+            quarter_weight: 0.2,
             gradient_weight: 0.003,
             position_iterations: 12,
             position_cg_iterations: 1,
