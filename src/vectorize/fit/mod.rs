@@ -132,7 +132,7 @@ impl<'a> Fitting<'a> {
     }
 
     fn first_colors(&mut self) {
-        let evidence = self.look(0.0);
+        let evidence = self.look(Beside::default());
         self.report.pixels = evidence.pixels();
         self.report.rms_before = self.rms(&evidence);
         self.colors.optimize(&self.model, &evidence, self.params.color_iterations, self.params);
@@ -143,11 +143,12 @@ impl<'a> Fitting<'a> {
     /// Half of the steps without quarters of pixels, which cost as much as all else and hardly matter on the way.
     fn positions(&mut self) {
         let all = self.params.position_iterations;
-        let rough = FitParams { position_iterations: all / 2, quarter_weight: 0.0, ..self.params.clone() };
-        let fine = FitParams { position_iterations: all - all / 2, ..self.params.clone() };
+        // What gradients cost would hold the vertices of long slivers, and with them the mesh.
+        let fine = FitParams { position_iterations: all - all / 2, gradient_weight: 0.0, ..self.params.clone() };
+        let rough = FitParams { position_iterations: all / 2, quarter_weight: 0.0, ..fine.clone() };
         let guard = Guard::new(&self.patch.mesh, self.params.minimum_altitude);
         for params in [rough, fine].iter().filter(|params| params.position_iterations > 0) {
-            let evidence = self.look(params.quarter_weight);
+            let evidence = self.look(params.beside());
             let (patch, model, colors) = (&mut self.patch, &self.model, &mut self.colors);
             let (evidence, refined) =
                 refine::optimize_positions(patch, (model, &guard), colors, evidence, self.frames, params);
@@ -181,7 +182,7 @@ impl<'a> Fitting<'a> {
     fn final_colors(&mut self) {
         // Where positions stay nothing can fit the quarters.
         let quarter_weight = if self.params.position_iterations > 0 { self.params.quarter_weight } else { 0.0 };
-        let evidence = self.look(quarter_weight);
+        let evidence = self.look(Beside { quarter: quarter_weight, ..self.params.beside() });
         self.colors.optimize(&self.model, &evidence, self.params.color_iterations, self.params);
         self.report.rms_after = self.rms(&evidence);
         let points = self.model.points(&self.patch.mesh.positions);
@@ -202,9 +203,8 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// What the frames say at the present positions.
-    fn look(&mut self, quarter_weight: f32) -> Evidence {
-        let beside = Beside { quarter: quarter_weight, ..self.params.beside() };
+    /// What the frames say at the present positions, with what counts beside the centres.
+    fn look(&mut self, beside: Beside) -> Evidence {
         let memory = match self.seen.take() {
             Some(evidence) if evidence.beside == beside => return evidence,
             other => other.unwrap_or_default(),

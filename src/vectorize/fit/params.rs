@@ -36,7 +36,7 @@ pub struct FitParams {
     /// enlarged. 0: it does not count.
     pub quarter_weight: f32,
     /// What the squared gradient of colour, in (levels / pixel)^2, costs over a pixel and a frame beside the squared error
-    /// there: it decides where no pixel does. 0: nothing.
+    /// there, when colours are fitted for the last time: it decides where no pixel does. 0: nothing.
     pub gradient_weight: f32,
 
     /// Steps of the position optimisation; 0: positions stay.
