@@ -62,7 +62,9 @@ impl Index {
             return Err(ParseError::Length { field: "index footer", expected: packet.len(), found: body.len() });
         }
         let entries: Vec<IndexEntry> = body[COUNT_BYTES..COUNT_BYTES + count * ENTRY_BYTES]
-            .chunks_exact(ENTRY_BYTES)
+            .as_chunks::<ENTRY_BYTES>()
+            .0
+            .iter()
             .map(|entry| IndexEntry { frame_number: read_u64(entry, 0), distance: read_u64(entry, 8) })
             .collect();
         check_order(&entries, header.frame_number)?;

@@ -160,9 +160,15 @@ impl Frame {
         for y in 0..height as usize {
             let row = &planes[0].data[y * planes[0].stride..];
             match format {
-                PixelFormat::Rgb => pixels.extend(row.chunks_exact(3).take(width_px).map(|p| [p[0], p[1], p[2]])),
-                PixelFormat::Rgbx => pixels.extend(row.chunks_exact(4).take(width_px).map(|p| [p[0], p[1], p[2]])),
-                PixelFormat::Bgrx => pixels.extend(row.chunks_exact(4).take(width_px).map(|p| [p[2], p[1], p[0]])),
+                PixelFormat::Rgb => {
+                    pixels.extend(row.as_chunks::<3>().0.iter().take(width_px).map(|p| [p[0], p[1], p[2]]))
+                }
+                PixelFormat::Rgbx => {
+                    pixels.extend(row.as_chunks::<4>().0.iter().take(width_px).map(|p| [p[0], p[1], p[2]]))
+                }
+                PixelFormat::Bgrx => {
+                    pixels.extend(row.as_chunks::<4>().0.iter().take(width_px).map(|p| [p[2], p[1], p[0]]))
+                }
                 PixelFormat::I420 | PixelFormat::Nv12 => {
                     let chroma = ChromaRow::new(format, (width, height), planes, y);
                     pixels.extend((0..width_px).map(|x| {

@@ -31,7 +31,7 @@ pub(crate) fn with_surface((width, height): (u32, u32), work: impl FnOnce(&mut S
     let planes = vec![Plane { data: &mut data, stride: 3 * width as usize }];
     let surface = Surface::try_new(PixelFormat::Rgb, YuvMatrix::Bt601, (width, height), planes);
     work(&mut surface.expect("a surface"));
-    data.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()
+    data.as_chunks().0.to_vec()
 }
 
 /// `mesh` with every wedge in one colour.
