@@ -1,6 +1,6 @@
 //! Where a simplex of the lattice has its cut, triple or quadruple point.
 //!
-//! In: positions of its corners. Out: a position strictly inside. Forbidden here: anything beyond the simplex, so that
+//! In: positions of its corners, of a long edge also where its labels meet. Out: a position strictly inside. Forbidden here: anything beyond the simplex, so that
 //! all who share it agree.
 
 use glam::IVec3;
@@ -17,11 +17,27 @@ use glam::IVec3;
 pub(super) fn inner_point(corners: &[IVec3]) -> IVec3 {
     let count = corners.len() as i32;
     corners.windows(2).zip((1..count).rev()).fold(corners[0], |point, (pair, share)| {
-        let step = pair[1] - pair[0];
-        let parts = gcd(gcd(step.x.abs(), step.y.abs()), step.z.abs());
+        let (least, parts) = divided(pair[1] - pair[0]);
         let taken = (2 * parts * share + count) / (2 * count);
-        point + step / parts * taken
+        point + least * taken
     })
+}
+
+/// The lattice position strictly inside of an edge that is nearest to `share` of its way; one that takes two steps of the
+/// dense lattice has several.
+///
+/// In tets of two labels all points are cuts, and wherever these lie on their edges the pieces are positive: each has
+/// three corners in a face or along two edges, and the products of the shares for its volume.
+pub(super) fn cut_point([start, end]: [IVec3; 2], share: f32) -> IVec3 {
+    let (least, parts) = divided(end - start);
+    debug_assert!(parts > 1, "{start} to {end}");
+    start + least * ((parts as f32 * share).round() as i32).clamp(1, parts - 1)
+}
+
+/// A step as a multiple of the least step of that direction.
+fn divided(step: IVec3) -> (IVec3, i32) {
+    let parts = gcd(gcd(step.x.abs(), step.y.abs()), step.z.abs());
+    (step / parts, parts)
 }
 
 /// Greatest common divisor of numbers >= 0 that are not both 0.
@@ -62,6 +78,38 @@ mod tests {
                     [a, b, c] => assert_eq!((b - a).cross(c - a).dot(point - a), 0),
                     _ => {}
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn tets_of_two_labels_may_be_cut_anywhere() {
+        let table = StencilTable::new();
+        let mut seed = 1u32;
+        let mut share = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 8) as f32 / (1 << 24) as f32
+        };
+        for (chain, positive) in KUHN_TETS {
+            let corners = chain.map(|c| corner_position(IVec3::splat(64), c));
+            for assignment in (0..16u32).flat_map(|n| [n; 50]) {
+                let labels = std::array::from_fn(|corner| Label(assignment >> corner & 1));
+                let mut points = [IVec3::ZERO; 16];
+                for (simplex, point) in points.iter_mut().enumerate().skip(1) {
+                    let members: Vec<IVec3> = (0..4).filter(|c| simplex >> c & 1 == 1).map(|c| corners[c]).collect();
+                    *point = match members[..] {
+                        [start, end] => cut_point([start, end], share()),
+                        _ => members[0],
+                    };
+                }
+                let mut filled = 0;
+                for tet in &table.stencil(labels).tets {
+                    let [a, b, c, d] = tet.map(|corner| points[usize::from(corner.simplex)]);
+                    let volume = if positive { volume6(a, b, c, d) } else { volume6(a, b, d, c) };
+                    assert!(volume > 0, "{chain:?} {labels:?} {tet:?}: {volume}");
+                    filled += volume;
+                }
+                assert_eq!(filled, 64 * 64 * 64);
             }
         }
     }

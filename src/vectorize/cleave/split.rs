@@ -1,17 +1,17 @@
 //! Cleaving of tets that are no cells' but anyone's: those of an adaptive lattice.
 //!
-//! In: a [`TetLattice`]. Out: the mesh of it, split as the dense lattice would be. Forbidden here: numbering by
+//! In: a [`TetLattice`]. Out: the mesh of it, split as the dense lattice would be, its longer edges where it says. Forbidden here: numbering by
 //! arithmetic; points between labels are few and found by their corners.
 
 use std::collections::HashMap;
 
 use glam::{IVec3, Vec3};
 
-use super::point::inner_point;
+use super::point::{cut_point, inner_point};
 use super::stencil::StencilTable;
 use super::{CleaveError, check_size};
 use crate::mesh::{TetMesh, Wedge, WedgeId};
-use crate::vectorize::lattice::TetLattice;
+use crate::vectorize::lattice::{EdgeCut, TetLattice};
 
 /// Builds the mesh of `lattice`: as [`super::cleave`] does of a dense one.
 ///
@@ -94,15 +94,34 @@ impl Splitter<'_> {
         if let Some(&wedge) = self.points.get(&key) {
             return wedge;
         }
-        let corners: Vec<IVec3> = members.iter().map(|&v| self.lattice.positions[v as usize]).collect();
-        let vertex = self.mesh.push_vertex(inner_point(&corners));
-        let wedges: Vec<u32> = members.iter().map(|&v| self.mesh.push_wedge(self.wedge(v, vertex)).0).collect();
-        self.points.insert(key, wedges[0]);
-        wedges[0]
+        let wedge = match self.long_cut(&members) {
+            Some(cut) => {
+                let position = cut_point(cut.edge.map(|v| self.lattice.positions[v as usize]), cut.share);
+                self.push_point(position, cut.edge.into_iter().zip(cut.colors))
+            }
+            None => {
+                let corners: Vec<IVec3> = members.iter().map(|&v| self.lattice.positions[v as usize]).collect();
+                let colors = members.iter().map(|&v| (v, self.lattice.colors[v as usize]));
+                self.push_point(inner_point(&corners), colors)
+            }
+        };
+        self.points.insert(key, wedge);
+        wedge
     }
 
-    fn wedge(&self, corner: u32, vertex: crate::mesh::VertexId) -> Wedge {
-        let (label, color): (_, Vec3) = (self.lattice.labels[corner as usize], self.lattice.colors[corner as usize]);
-        Wedge { vertex, label, color }
+    /// The lattice's own cut of an edge.
+    fn long_cut(&self, members: &[u32]) -> Option<&EdgeCut> {
+        let edge: [u32; 2] = members.try_into().ok()?;
+        let found = self.lattice.cuts.binary_search_by_key(&edge, |cut| cut.edge).ok()?;
+        Some(&self.lattice.cuts[found])
+    }
+
+    /// A point with a wedge of the label of each of `corners`, of these colours. The first wedge.
+    fn push_point(&mut self, position: IVec3, corners: impl Iterator<Item = (u32, Vec3)>) -> u32 {
+        let (vertex, first) = (self.mesh.push_vertex(position), self.mesh.wedges.len() as u32);
+        for (corner, color) in corners {
+            self.mesh.push_wedge(Wedge { vertex, label: self.lattice.labels[corner as usize], color });
+        }
+        first
     }
 }

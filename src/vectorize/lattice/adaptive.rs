@@ -11,6 +11,7 @@ use glam::{IVec3, Vec3};
 use super::axis::{Axis, CELL};
 use super::bisect::{Bisection, Leaves};
 use super::importance::Importance;
+use super::labels::LayerLabels;
 use super::samples::{Grid, LEVELS, pyramid};
 use super::{LatticeError, check};
 use crate::mesh::Domain;
@@ -28,9 +29,22 @@ pub struct TetLattice {
     pub labels: Vec<Label>,
     /// Of the vertices, in 8-bit levels: of the pixel there, or smoothed over as much as the tets around span.
     pub colors: Vec<Vec3>,
-    /// Corners of the tets, all of positive volume. Mixed ones have corners next to each other, as in the dense
-    /// lattice.
+    /// Corners of the tets, all of positive volume. Those of three or four labels have corners next to each other, as in
+    /// the dense lattice.
     pub tets: Vec<[u32; 4]>,
+    /// Where edges between labels are cut that are longer than the dense lattice's; ascending by edge.
+    pub cuts: Vec<EdgeCut>,
+}
+
+/// The cut of an edge between two labels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgeCut {
+    /// Its vertices, ascending.
+    pub edge: [u32; 2],
+    /// How far along from the first, strictly between 0 and 1.
+    pub share: f32,
+    /// Of the pixels on either side, in 8-bit levels.
+    pub colors: [Vec3; 2],
 }
 
 /// Builds lattices layer by layer.
@@ -46,15 +60,8 @@ pub struct AdaptiveLattice {
 struct Layer {
     axes: [Axis; 3],
     pyramid: [Grid; LEVELS],
-    /// Labels along x for each (t, y); a single label where all is one.
     labels: LayerLabels,
     importance: Importance,
-}
-
-#[derive(Debug)]
-enum LayerLabels {
-    Uniform(Label),
-    Rows(Vec<Vec<Label>>),
 }
 
 impl AdaptiveLattice {
@@ -118,27 +125,11 @@ impl AdaptiveLattice {
         let threshold = importance.threshold((self.vertices_per_pixel * pixels) as usize);
         importance.normalize(threshold);
         let labels = LayerLabels::new(&axes, labels);
-        if let LayerLabels::Rows(rows) = &labels {
-            importance.need_labels(rows);
+        if let LayerLabels::Mixed(labels) = &labels {
+            importance.need(|vertex, step| labels.need(vertex, step));
             importance.saturate();
         }
         Layer { axes, pyramid, labels, importance }
-    }
-}
-
-impl LayerLabels {
-    fn new(axes: &[Axis; 3], planes: &[LabelPlane]) -> Self {
-        let first = planes[0].labels()[0];
-        if planes.iter().all(|plane| plane.labels().iter().all(|&label| label == first)) {
-            return Self::Uniform(first);
-        }
-        let [columns, lines, times] = axes.each_ref().map(Axis::lines);
-        let row = |n: usize| {
-            let (plane, line) = (&planes[times[n / lines.len()].low], lines[n % lines.len()].low);
-            let start = line * plane.width() as usize;
-            columns.iter().map(|column| plane.labels()[start + column.low]).collect()
-        };
-        Self::Rows(map((0..lines.len() * times.len()).collect(), row))
     }
 }
 
@@ -146,39 +137,77 @@ impl Layer {
     /// The tets whose vertices are important enough, with what is known at their corners.
     fn lattice(&self, domain: Domain) -> TetLattice {
         let leaves = self.leaves();
-        let size = self.importance.size();
-        const ABSENT: u8 = u8::MAX;
-        let mut levels = vec![ABSENT; size.iter().product()];
-        for part in &leaves {
-            for (tet, &level) in part.tets.iter().zip(&part.levels) {
-                for &v in tet {
-                    levels[v as usize] = levels[v as usize].min(level);
-                }
-            }
-        }
+        let levels = self.levels(&leaves);
         let mut lattice = TetLattice {
             domain,
             positions: Vec::new(),
             labels: Vec::new(),
             colors: Vec::new(),
             tets: Vec::with_capacity(leaves.iter().map(|part| part.tets.len()).sum()),
+            cuts: Vec::new(),
         };
         let mut numbers = vec![0; levels.len()];
         for (index, &level) in levels.iter().enumerate().filter(|&(_, &level)| level != ABSENT) {
             numbers[index] = lattice.positions.len() as u32;
-            let vertex = [index % size[0], index / size[0] % size[1], index / (size[0] * size[1])];
+            let vertex = self.vertex(index as u32);
             lattice.positions.push(IVec3::from_array(std::array::from_fn(|a| self.axes[a].lines()[vertex[a]].place)));
-            lattice.labels.push(match &self.labels {
-                LayerLabels::Uniform(label) => *label,
-                LayerLabels::Rows(rows) => rows[index / size[0]][vertex[0]],
-            });
-            let color = self.pyramid[usize::from(level)].at(vertex.map(|n| n >> level));
-            lattice.colors.push(Vec3::from_array(color.map(f32::from)));
+            lattice.labels.push(self.labels.at(vertex));
+            lattice.colors.push(self.color(vertex, level));
         }
+        lattice.cuts = self.cuts(&leaves, &numbers);
         for part in leaves {
             lattice.tets.extend(part.tets.into_iter().map(|tet| tet.map(|v| numbers[v as usize])));
         }
         lattice
+    }
+
+    /// The level of the pyramid that each vertex is sampled at: the finest that a tet of its asks for, and pixels alone
+    /// where labels meet.
+    fn levels(&self, leaves: &[Leaves]) -> Vec<u8> {
+        let mut levels = vec![ABSENT; self.importance.size().iter().product()];
+        for part in leaves {
+            for (tet, &level) in part.tets.iter().zip(&part.levels) {
+                let level = if self.is_mixed(tet) { 0 } else { level };
+                for &v in tet {
+                    levels[v as usize] = levels[v as usize].min(level);
+                }
+            }
+        }
+        levels
+    }
+
+    fn is_mixed(&self, tet: &[u32; 4]) -> bool {
+        let LayerLabels::Mixed(labels) = &self.labels else { return false };
+        let [first, rest @ ..] = tet.map(|v| labels.at(self.vertex(v)));
+        rest.into_iter().any(|label| label != first)
+    }
+
+    /// Cuts of the leaves' edges between labels, but for the shortest edges.
+    fn cuts(&self, leaves: &[Leaves], numbers: &[u32]) -> Vec<EdgeCut> {
+        let LayerLabels::Mixed(labels) = &self.labels else { return Vec::new() };
+        let mixed = leaves.iter().flat_map(|part| &part.tets).filter(|tet| self.is_mixed(tet));
+        let edges = mixed.flat_map(|&[a, b, c, d]| [[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]]);
+        let mut edges: Vec<[u32; 2]> = edges.map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        let cut = |edge: [u32; 2]| {
+            let crossing = labels.crossing(edge.map(|v| self.vertex(v)))?;
+            let edge = edge.map(|v| numbers[v as usize]);
+            Some(EdgeCut { edge, share: crossing.share, colors: crossing.samples.map(|sample| self.color(sample, 0)) })
+        };
+        edges.into_iter().filter_map(cut).collect()
+    }
+
+    /// Indices along x, y, t of a vertex by its number in the layer.
+    #[inline]
+    fn vertex(&self, index: u32) -> [usize; 3] {
+        let ([columns, lines, _], index) = (self.importance.size(), index as usize);
+        [index % columns, index / columns % lines, index / (columns * lines)]
+    }
+
+    fn color(&self, vertex: [usize; 3], level: u8) -> Vec3 {
+        let color = self.pyramid[usize::from(level)].at(vertex.map(|n| n >> level));
+        Vec3::from_array(color.map(f32::from))
     }
 
     /// Leaves by rows of cells.
@@ -194,3 +223,6 @@ impl Layer {
         })
     }
 }
+
+/// Level of a vertex that no leaf has.
+const ABSENT: u8 = u8::MAX;

@@ -13,7 +13,6 @@
 use super::axis::{Axis, CELL};
 use super::samples::{Grid, LEVELS};
 use crate::vectorize::parallel::{for_each, map};
-use crate::video::Label;
 
 /// Importance of a vertex that labels ask for.
 pub(super) const NEEDED: f32 = f32::INFINITY;
@@ -46,36 +45,19 @@ impl Importance {
         Self { size, planes }
     }
 
-    /// Makes everything important near which labels differ, so that mixed tets are of the smallest size.
-    /// `rows` has the labels along the lines in x for each (t, y).
-    pub(super) fn need_labels(&mut self, rows: &[Vec<Label>]) {
-        let [columns, lines, planes] = self.size;
-        for z in (1..planes).step_by(2) {
-            for y in (1..lines).step_by(2) {
-                for x in (1..columns).step_by(2) {
-                    let label = rows[z * lines + y][x];
-                    let is_mixed = (z - 1..=z + 1).any(|z| {
-                        (y - 1..=y + 1).any(|y| rows[z * lines + y][x - 1..=x + 1].iter().any(|&l| l != label))
-                    });
-                    if is_mixed {
-                        self.need_cell([x, y, z]);
-                    }
+    /// Makes the vertices important that `is_needed` says of, given the vertex and its step.
+    pub(super) fn need(&mut self, is_needed: impl Fn([usize; 3], usize) -> bool + Sync) {
+        let (columns, lines) = (self.size[0], self.size[1]);
+        let rows = self.planes.iter_mut().flat_map(|plane| plane.chunks_mut(columns)).enumerate().collect();
+        for_each(rows, |(n, row): (usize, &mut [f32])| {
+            for (x, value) in row.iter_mut().enumerate() {
+                let vertex = [x, n % lines, n / lines];
+                let level = (vertex[0] | vertex[1] | vertex[2]).trailing_zeros();
+                if level < CELL.trailing_zeros() && is_needed(vertex, 1 << level) {
+                    *value = NEEDED;
                 }
             }
-        }
-    }
-
-    /// Every vertex with an odd coordinate of the smallest cell around `centre`.
-    fn need_cell(&mut self, [x, y, z]: [usize; 3]) {
-        for k in z - 1..=z + 1 {
-            for j in y - 1..=y + 1 {
-                for i in x - 1..=x + 1 {
-                    if (i | j | k) & 1 == 1 {
-                        self.planes[k][j * self.size[0] + i] = NEEDED;
-                    }
-                }
-            }
-        }
+        });
     }
 
     /// Lets no vertex be less important than those that need it.

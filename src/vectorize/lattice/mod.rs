@@ -9,11 +9,12 @@ mod adaptive;
 mod axis;
 mod bisect;
 mod importance;
+mod labels;
 mod samples;
 
 use std::sync::Arc;
 
-pub use adaptive::{AdaptiveLattice, TetLattice};
+pub use adaptive::{AdaptiveLattice, EdgeCut, TetLattice};
 
 use glam::IVec3;
 use thiserror::Error;
