@@ -163,13 +163,16 @@ impl<'a> Fitting<'a> {
     /// Pins what folds at level 1 before positions are optimised, so that they know of it: 0.5 dB better than pins
     /// that come after, and 2 dB better than positions held where nothing folds.
     fn first_pins(&mut self) {
-        if self.params.subdivision_levels > 0 {
+        if self.is_subdivided() {
             self.report.pins = pin::pin_patch(&mut self.patch, 1);
             self.follow_positions();
         }
     }
 
     fn final_pins(&mut self) {
+        if !self.is_subdivided() {
+            return;
+        }
         let pins = pin::pin_patch(&mut self.patch, 2);
         self.report.pins = PinReport {
             folded_tets: self.report.pins.folded_tets + pins.folded_tets,
@@ -195,9 +198,14 @@ impl<'a> Fitting<'a> {
         self.report
     }
 
+    /// Level 0 is drawn as it is, whatever would fold at others.
+    fn is_subdivided(&self) -> bool {
+        self.params.subdivision_levels > 0
+    }
+
     /// Which diagonal splits a tet's octahedron follows from positions, and masks from pins; level 0 has neither.
     fn follow_positions(&mut self) {
-        if self.params.subdivision_levels > 0 {
+        if self.is_subdivided() {
             self.model = Model::new(&self.patch.mesh, &self.patch.free, self.params.subdivision_levels);
             self.seen = None;
         }

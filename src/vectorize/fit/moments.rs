@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use glam::{DVec3, IVec3, Mat3, Vec3, Vec4};
+use glam::{DVec3, IVec3, Vec3, Vec4};
 
 use super::edges::Piece;
 use super::evidence::Beside;
@@ -16,7 +16,7 @@ use super::marks::Marks;
 use super::model::Model;
 use super::parallel;
 use super::planes::Planes;
-use super::polygon::{FLAT, Polygon, Weights};
+use super::polygon::{Polygon, Weights};
 use super::quarters::{color, quarter};
 use super::smoothness::{Gram, gradient_form};
 use crate::video::Frame;
@@ -124,20 +124,6 @@ pub(super) fn find_pieces(model: &Model, points: &[IVec3], view: &View<'_>) -> V
         pieces
     };
     parallel::map(model.tets.len().div_ceil(TETS_PER_TASK), task).concat()
-}
-
-/// The gradient of colour inside a tet with corners `p` (fine units) and corner colours `c`: maps a displacement in
-/// (x, y, t), in pixels and frames, to a change of colour. Zero for a flat tet.
-pub(super) fn color_gradient(p: [IVec3; 4], c: [Vec3; 4], fine_unit: f32) -> Mat3 {
-    let [u, v, w] = [p[1] - p[0], p[2] - p[0], p[3] - p[0]].map(|e| e.as_dvec3() / f64::from(fine_unit));
-    let volume6 = u.cross(v).dot(w);
-    if volume6.abs() < FLAT {
-        return Mat3::ZERO;
-    }
-    let gradients = [v.cross(w), w.cross(u), u.cross(v)].map(|g| (g / volume6).as_vec3());
-    let steps = [c[1] - c[0], c[2] - c[0], c[3] - c[0]];
-    let column = |axis: usize| (0..3).map(|i| steps[i] * gradients[i][axis]).sum();
-    Mat3::from_cols(column(0), column(1), column(2))
 }
 
 impl View<'_> {

@@ -12,8 +12,8 @@ use glam::{IVec3, Mat3, Vec3};
 use super::edges::Slopes;
 use super::evidence::Evidence;
 use super::model::Model;
-use super::moments::color_gradient;
 use super::parallel;
+use super::smoothness::color_gradient;
 use super::sparse::System;
 
 /// Parts in which sums over tets are collected. Part of the result, so never derived from the machine.
@@ -75,7 +75,7 @@ impl<'a> NormalEquations<'a> {
         let mut system = Self::of_colors(model, evidence, mask, color_damping);
         let gradients = parallel::map(model.tets.len(), |tet| {
             let corners = model.tet_points(tet).map(|p| points[p]);
-            color_gradient(corners, model.tets[tet].map(|n| node_colors[n as usize]), model.fine_unit as f32)
+            color_gradient(corners, model.tets[tet].map(|n| node_colors[n as usize]), model.fine_unit)
         });
         let slopes = Slopes::new(&model.interfaces, points);
         let motion = Motion { gradients, slopes, nodes: node_colors.to_vec() };

@@ -1,11 +1,11 @@
-//! Smoothness: what a change of colour inside of a tet costs.
+//! The gradient of colour inside of a tet, and what it costs.
 //!
-//! In: a tet's corners. Out: a quadratic form of its corner colours, the integral of the squared gradient. Forbidden here:
+//! In: a tet's corners. Out: the gradient for their colours; the integral of its square as a form of them. Forbidden here:
 //! frames. Dirichlet's energy, in a measure far below that of pixels: it decides where no pixel does. Tets between the
 //! centres of pixels would keep whatever colours their vertices had where they came from, and show it as splinters
 //! when the picture is enlarged.
 
-use glam::{IVec3, Vec3};
+use glam::{DVec3, IVec3, Mat3, Vec3};
 
 use super::polygon::FLAT;
 
@@ -13,18 +13,40 @@ use super::polygon::FLAT;
 pub(super) type Gram = [f32; 10];
 
 /// Corners that a form's entries belong to.
-pub(super) const PAIRS: [[usize; 2]; 10] =
-    [[0, 0], [1, 1], [2, 2], [3, 3], [0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+const PAIRS: [[usize; 2]; 10] = [[0, 0], [1, 1], [2, 2], [3, 3], [0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
+/// The gradients of the weights of corners 1, 2, 3 times six times the volume, and that, for a tet with corners `p` (fine
+/// units), in pixels and frames.
+fn slopes(p: [IVec3; 4], fine_unit: i32) -> ([DVec3; 3], f64) {
+    let [u, v, w] = [p[1] - p[0], p[2] - p[0], p[3] - p[0]].map(|e| e.as_dvec3() / f64::from(fine_unit));
+    let volume6 = u.cross(v).dot(w);
+    ([v.cross(w), w.cross(u), u.cross(v)], volume6)
+}
+
+/// The gradient of colour inside a tet with corners `p` (fine units) and corner colours `c`: maps a displacement in
+/// (x, y, t), in pixels and frames, to a change of colour. Zero for a flat tet.
+pub(super) fn color_gradient(p: [IVec3; 4], c: [Vec3; 4], fine_unit: i32) -> Mat3 {
+    let (slopes, volume6) = slopes(p, fine_unit);
+    if volume6.abs() < FLAT {
+        return Mat3::ZERO;
+    }
+    let gradients = slopes.map(|g| (g / volume6).as_vec3());
+    let steps = [c[1] - c[0], c[2] - c[0], c[3] - c[0]];
+    let column = |axis: usize| (0..3).map(|i| steps[i] * gradients[i][axis]).sum();
+    Mat3::from_cols(column(0), column(1), column(2))
+}
 
 /// `weight` times the integral of the squared gradient over a tet with corners `p` (fine units), lengths in pixels and
 /// frames alike. Nothing for a flat or an inverted one.
 pub(super) fn gradient_form(p: [IVec3; 4], fine_unit: i32, weight: f32) -> Option<Gram> {
-    let [u, v, w] = [p[1] - p[0], p[2] - p[0], p[3] - p[0]].map(|e| e.as_dvec3() / f64::from(fine_unit));
-    let volume6 = u.cross(v).dot(w);
-    if weight <= 0.0 || volume6 < FLAT {
+    if weight <= 0.0 {
         return None;
     }
-    let [b, c, d] = [v.cross(w), w.cross(u), u.cross(v)].map(|g| g / volume6);
+    let (slopes, volume6) = slopes(p, fine_unit);
+    if volume6 < FLAT {
+        return None;
+    }
+    let [b, c, d] = slopes.map(|g| g / volume6);
     let gradients = [-(b + c + d), b, c, d];
     let scale = f64::from(weight) * volume6 / 6.0;
     Some(PAIRS.map(|[i, j]| (scale * gradients[i].dot(gradients[j])) as f32))
