@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
-pub use self::config::{EncoderConfig, ErrorMetric, LatticeKind, SpeedPreset};
+pub use self::config::{EncoderConfig, ErrorMetric, LatticeKind, SpeedPreset, TopologyRule};
 use self::observer::Observer;
 pub use self::observer::{Event, Stage};
 use self::rate::{ErrorControl, RateControl};

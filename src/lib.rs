@@ -28,5 +28,7 @@ pub mod video;
 pub use bitstream::{Packet, SequenceHeader};
 pub use decoder::{DecodeError, Decoder, DecoderConfig, PacketInfo, RenderParams, Viewport};
 #[cfg(feature = "encode")]
-pub use encoder::{EncodeError, Encoder, EncoderConfig, ErrorMetric, Event, LatticeKind, SpeedPreset, Stage};
+pub use encoder::{
+    EncodeError, Encoder, EncoderConfig, ErrorMetric, Event, LatticeKind, SpeedPreset, Stage, TopologyRule,
+};
 pub use video::{Frame, PixelFormat, Plane, Surface, YuvMatrix};

@@ -248,6 +248,21 @@ fn blocks_join_into_one_tiling() {
 }
 
 #[test]
+fn blocks_and_the_whole_take_turns() {
+    let clip = Clip::new([24, 15, 9], textured, |x, y, _| u32::from(x > 8) + u32::from(y > 7));
+    let params = SimplifyParams { block_vertices: 1500, ..SimplifyParams::default() };
+    let strict = SimplifyParams { topology: Topology::Strict, ..params };
+    let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
+    work.append(&clip.whole(), &params);
+    simplify(&mut work, ALL, goal(800), &strict);
+    work.simplify_blocks(ALL, BlockGoal { keep: 0.5, max_error: f32::INFINITY, shift: 0.0 }, &params);
+    assert!(work.vertex_count() < 500, "{}", work.vertex_count());
+    let mut mesh = TetMesh::empty(clip.domain);
+    work.commit(i32::MAX, &mut mesh);
+    assert_eq!(validate(&mesh), Ok(()));
+}
+
+#[test]
 fn blocks_leave_frozen_vertices() {
     let clip = Clip::new([24, 15, 9], textured, |_, _, _| 0);
     let params = SimplifyParams { block_vertices: 1500, ..SimplifyParams::default() };

@@ -1,8 +1,7 @@
 //! The encoder's settings as options of a command line: a preset, and what is to differ from it.
 
 use clap::{Args, ValueEnum};
-use tetvec::vectorize::simplify::Topology;
-use tetvec::{EncoderConfig, ErrorMetric, LatticeKind, SpeedPreset};
+use tetvec::{EncoderConfig, ErrorMetric, LatticeKind, SpeedPreset, TopologyRule};
 
 /// Options of the encoder.
 #[derive(Debug, Clone, Args)]
@@ -46,12 +45,19 @@ pub(crate) struct Settings {
     /// Use the paper's error metric.
     #[arg(long)]
     paper_metric: bool,
-    /// Keep the topology of labels strictly.
-    #[arg(long)]
-    strict: bool,
+    /// How strictly the topology of labels is kept.
+    #[arg(long, value_enum)]
+    topology: Option<Topology>,
     /// Worker threads; 0: all cores.
     #[arg(long, default_value_t = 0)]
     threads: usize,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Topology {
+    Auto,
+    Free,
+    Strict,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -82,6 +88,11 @@ impl Settings {
             Lattice::Adaptive => LatticeKind::Adaptive,
             Lattice::Dense => LatticeKind::Dense,
         });
+        let topology = self.topology.map(|topology| match topology {
+            Topology::Auto => TopologyRule::Auto,
+            Topology::Free => TopologyRule::Free,
+            Topology::Strict => TopologyRule::Strict,
+        });
         EncoderConfig {
             simplification_ratio: self.simplification_ratio,
             target_error: self.target_error,
@@ -95,7 +106,7 @@ impl Settings {
             position_steps: self.position_steps.unwrap_or(base.position_steps),
             refits: self.refits.unwrap_or(base.refits),
             error_metric: if self.paper_metric { ErrorMetric::Paper } else { base.error_metric },
-            topology: if self.strict { Topology::Strict } else { base.topology },
+            topology: topology.unwrap_or(base.topology),
             threads: self.threads,
             ..base
         }

@@ -3,7 +3,6 @@
 use super::EncodeError;
 use crate::bitstream::{Fraction, Limits, SequenceHeader};
 use crate::vectorize::lattice::AdaptiveLattice;
-use crate::vectorize::simplify::Topology;
 use crate::video::Frame;
 
 /// What the error quadrics of the simplification measure.
@@ -24,6 +23,18 @@ pub enum LatticeKind {
     Adaptive,
     /// One vertex a pixel and frame, as in the paper.
     Dense,
+}
+
+/// How strictly the simplification keeps the topology of labels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum TopologyRule {
+    /// Strictly as far as the goal can be reached, then freely: thin strokes stay whole.
+    #[default]
+    Auto,
+    /// Labels may merge and pinch from the start.
+    Free,
+    /// Strictly, whether the goal is reached or not (§IV-A3).
+    Strict,
 }
 
 /// Points of time spent against error reached, measured in docs/benchmarks.md.
@@ -77,7 +88,7 @@ pub struct EncoderConfig {
     /// Vertices that an adaptive lattice starts with for each that is to be left, [`Self::LATTICE_DENSITY`].
     pub lattice_density: f64,
     /// How strictly the topology of labels is kept.
-    pub topology: Topology,
+    pub topology: TopologyRule,
     /// Steps of the position optimisation, [`Self::POSITION_STEPS`]; 0: positions stay where edges collapsed to.
     pub position_steps: u32,
     /// Fits on the way to the simplification ratio, [`Self::REFITS`]: each lets simplification start anew from a mesh that
@@ -126,7 +137,7 @@ impl EncoderConfig {
             error_metric: ErrorMetric::Color,
             lattice: LatticeKind::Adaptive,
             lattice_density: 12.0,
-            topology: Topology::Free,
+            topology: TopologyRule::Auto,
             position_steps: 12,
             refits: 2,
             threads: 0,
@@ -159,7 +170,7 @@ impl EncoderConfig {
                 subdivision_levels: 1,
                 error_metric: ErrorMetric::Paper,
                 lattice: LatticeKind::Dense,
-                topology: Topology::Strict,
+                topology: TopologyRule::Strict,
                 position_steps: 0,
                 refits: 0,
                 ..base

@@ -10,12 +10,14 @@ use super::proof::Proof;
 use super::quantize::{color_steps, rounded_rms};
 use super::readiness::hops;
 use super::runs::{Run, Runs};
-use super::{EncodeError, EncoderConfig, ErrorMetric};
+use super::{EncodeError, EncoderConfig, ErrorMetric, TopologyRule};
 use crate::bitstream::{MAX_RINGS, Packet, SlabWriter, rings};
 use crate::mesh::{Domain, StarTable, TetMesh};
 use crate::vectorize::fit::{FitParams, FitReport, FitRequest, fit};
 use crate::vectorize::lattice::AdaptiveLattice;
-use crate::vectorize::simplify::{BlockGoal, Goal, SimplifyParams, Unfrozen, WedgeQuadric, WorkMesh, simplify};
+use crate::vectorize::simplify::{
+    BlockGoal, Goal, SimplifyParams, Topology, Unfrozen, WedgeQuadric, WorkMesh, simplify,
+};
 use crate::video::{Frame, LabelPlane, Volume};
 
 /// Vertices a pixel of one frame that the transition from the sparse window to its dense leading layer may have.
@@ -106,6 +108,9 @@ pub(super) struct SlabEncoder<Q> {
     refits: u32,
     /// [`RUN_RATIO`], or what the first of these fits needs.
     run_ratio: f64,
+    topology: TopologyRule,
+    /// Whether labels differ anywhere so far.
+    is_cut: bool,
     simplify_params: SimplifyParams,
     fit_params: FitParams,
     work: WorkMesh<Q>,
@@ -148,9 +153,10 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             batch: config.window,
             refits,
             run_ratio: RUN_RATIO.max(refits::first_stage(refits)),
+            topology: config.topology,
+            is_cut: false,
             simplify_params: SimplifyParams {
                 max_extent_frames: config.window,
-                topology: config.topology,
                 // Made of colour errors, so no measure for distances.
                 surface_weight: match config.error_metric {
                     ErrorMetric::Color => SimplifyParams::default().surface_weight,
@@ -179,6 +185,8 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     }
 
     fn take(&mut self, frame: Arc<Frame>, labels: LabelPlane) {
+        self.is_cut |= labels.labels().iter().any(|label| *label != labels.labels()[0]);
+        self.simplify_params.topology = self.topologies()[0];
         self.volume.push(frame.clone());
         self.labels.push_back((self.planes, labels.clone()));
         self.runs.push(frame, labels);
@@ -214,6 +222,16 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         BlockGoal { keep: keep.min(1.0), max_error: f32::INFINITY, shift: 0.0 }
     }
 
+    /// In which order topologies are tried until the goal is reached.
+    fn topologies(&self) -> &'static [Topology] {
+        match self.topology {
+            // Of one label there is no more to keep than positive tets keep.
+            TopologyRule::Auto if self.is_cut => &[Topology::Strict, Topology::Free],
+            TopologyRule::Auto | TopologyRule::Free => &[Topology::Free],
+            TopologyRule::Strict => &[Topology::Strict],
+        }
+    }
+
     /// Whether the error decides, not the ratio.
     fn is_steered(&self) -> bool {
         self.target_error > 0.0
@@ -247,14 +265,11 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         }
         self.refit(unfrozen, goal.vertices, observer)?;
         observer.tell(Event::Began(Stage::Simplify));
-        if is_whole && !self.is_steered() {
-            for pass in &WINDOW_PASSES {
-                self.simplify_blocks(unfrozen, (pass.ratio * goal.vertices as f64) as usize, pass.shift, observer);
-            }
+        for &topology in self.topologies() {
+            self.simplify_params.topology = topology;
+            self.simplify_to(unfrozen, goal, observer);
         }
-        let report = simplify(&mut self.work, unfrozen, goal, &self.simplify_params);
-        log::debug!("simplify: {report:?}, {goal:?}");
-        observer.tell(Event::Simplified(report));
+        self.simplify_params.topology = self.topologies()[0];
         observer.tell(Event::Ended);
         self.frozen = match frames {
             Some(_) => i32::MAX,
@@ -263,6 +278,18 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         };
         self.work.commit(self.frozen, &mut self.committed);
         self.send_ready(frames, observer)
+    }
+
+    /// Simplifies the window to its goal, or as far as it goes.
+    fn simplify_to(&mut self, unfrozen: Unfrozen, goal: Goal, observer: &mut Observer) {
+        if self.kept == u32::MAX && !self.is_steered() {
+            for pass in &WINDOW_PASSES {
+                self.simplify_blocks(unfrozen, (pass.ratio * goal.vertices as f64) as usize, pass.shift, observer);
+            }
+        }
+        let report = simplify(&mut self.work, unfrozen, goal, &self.simplify_params);
+        log::debug!("simplify: {report:?}, {goal:?}");
+        observer.tell(Event::Simplified(report));
     }
 
     /// Simplifies the window in blocks to about so many vertices.

@@ -1,7 +1,6 @@
 //! Properties that are a choice of a few: the core's enumerations as GObject knows them.
 
 use gst::glib;
-use tetvec::vectorize::simplify::Topology as CoreTopology;
 
 /// Time spent against error reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, glib::Enum)]
@@ -71,29 +70,34 @@ impl From<tetvec::LatticeKind> for Lattice {
 #[enum_type(name = "GstTetvecEncTopology")]
 #[repr(i32)]
 pub enum Topology {
-    /// Regions may merge and pinch.
+    /// Strict as far as the goal can be reached, then free.
     #[default]
+    #[enum_value(name = "Strict as far as the goal can be reached, then free", nick = "auto")]
+    Auto = 0,
+    /// Regions may merge and pinch.
     #[enum_value(name = "Regions may merge and pinch", nick = "free")]
-    Free = 0,
+    Free = 1,
     /// Regions stay as they were labelled.
     #[enum_value(name = "Regions and their borders stay connected as they are, as in the paper", nick = "strict")]
-    Strict = 1,
+    Strict = 2,
 }
 
-impl From<Topology> for CoreTopology {
+impl From<Topology> for tetvec::TopologyRule {
     fn from(topology: Topology) -> Self {
         match topology {
+            Topology::Auto => Self::Auto,
             Topology::Free => Self::Free,
             Topology::Strict => Self::Strict,
         }
     }
 }
 
-impl From<CoreTopology> for Topology {
-    fn from(topology: CoreTopology) -> Self {
+impl From<tetvec::TopologyRule> for Topology {
+    fn from(topology: tetvec::TopologyRule) -> Self {
         match topology {
-            CoreTopology::Free => Self::Free,
-            CoreTopology::Strict => Self::Strict,
+            tetvec::TopologyRule::Auto => Self::Auto,
+            tetvec::TopologyRule::Free => Self::Free,
+            tetvec::TopologyRule::Strict => Self::Strict,
         }
     }
 }

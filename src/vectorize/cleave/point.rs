@@ -23,11 +23,11 @@ pub(super) fn inner_point(corners: &[IVec3]) -> IVec3 {
     })
 }
 
-/// The lattice position strictly inside of an edge that is nearest to `share` of its way; one that takes two steps of the
-/// dense lattice has several.
+/// The lattice position strictly inside of an edge that is nearest to `share` of its way. Edges of the adaptive lattice
+/// have several.
 ///
-/// In tets of two labels all points are cuts, and wherever these lie on their edges the pieces are positive: each has
-/// three corners in a face or along two edges, and the products of the shares for its volume.
+/// Wherever cuts lie on their edges, and other points inside of their simplices, all pieces are positive: the corners of
+/// each lie in simplices that contain one another, so its volume is a product of shares.
 pub(super) fn cut_point([start, end]: [IVec3; 2], share: f32) -> IVec3 {
     let (least, parts) = divided(end - start);
     debug_assert!(parts > 1, "{start} to {end}");
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn tets_of_two_labels_may_be_cut_anywhere() {
+    fn edges_may_be_cut_anywhere() {
         let table = StencilTable::new();
         let mut seed = 1u32;
         let mut share = || {
@@ -92,14 +92,14 @@ mod tests {
         };
         for (chain, positive) in KUHN_TETS {
             let corners = chain.map(|c| corner_position(IVec3::splat(64), c));
-            for assignment in (0..16u32).flat_map(|n| [n; 50]) {
-                let labels = std::array::from_fn(|corner| Label(assignment >> corner & 1));
+            for assignment in (0..256u32).flat_map(|n| [n; 20]) {
+                let labels = std::array::from_fn(|corner| Label(assignment >> (2 * corner) & 3));
                 let mut points = [IVec3::ZERO; 16];
                 for (simplex, point) in points.iter_mut().enumerate().skip(1) {
                     let members: Vec<IVec3> = (0..4).filter(|c| simplex >> c & 1 == 1).map(|c| corners[c]).collect();
                     *point = match members[..] {
                         [start, end] => cut_point([start, end], share()),
-                        _ => members[0],
+                        _ => inner_point(&members),
                     };
                 }
                 let mut filled = 0;

@@ -1,6 +1,6 @@
 //! Cleaving of tets that are no cells' but anyone's: those of an adaptive lattice.
 //!
-//! In: a [`TetLattice`]. Out: the mesh of it, split as the dense lattice would be, its longer edges where it says. Forbidden here: numbering by
+//! In: a [`TetLattice`]. Out: the mesh of it, split as the dense lattice would be, its edges where it says. Forbidden here: numbering by
 //! arithmetic; points between labels are few and found by their corners.
 
 use std::collections::HashMap;
@@ -94,7 +94,7 @@ impl Splitter<'_> {
         if let Some(&wedge) = self.points.get(&key) {
             return wedge;
         }
-        let wedge = match self.long_cut(&members) {
+        let wedge = match self.cut(&members) {
             Some(cut) => {
                 let position = cut_point(cut.edge.map(|v| self.lattice.positions[v as usize]), cut.share);
                 self.push_point(position, cut.edge.into_iter().zip(cut.colors))
@@ -110,7 +110,7 @@ impl Splitter<'_> {
     }
 
     /// The lattice's own cut of an edge.
-    fn long_cut(&self, members: &[u32]) -> Option<&EdgeCut> {
+    fn cut(&self, members: &[u32]) -> Option<&EdgeCut> {
         let edge: [u32; 2] = members.try_into().ok()?;
         let found = self.lattice.cuts.binary_search_by_key(&edge, |cut| cut.edge).ok()?;
         Some(&self.lattice.cuts[found])

@@ -11,7 +11,7 @@ use glam::{IVec3, Vec3};
 use super::axis::{Axis, CELL};
 use super::bisect::{Bisection, Leaves};
 use super::importance::Importance;
-use super::labels::LayerLabels;
+use super::labels::{Crossing, LayerLabels};
 use super::samples::{Grid, LEVELS, pyramid};
 use super::{LatticeError, check};
 use crate::mesh::Domain;
@@ -32,7 +32,7 @@ pub struct TetLattice {
     /// Corners of the tets, all of positive volume. Those of three or four labels have corners next to each other, as in
     /// the dense lattice.
     pub tets: Vec<[u32; 4]>,
-    /// Where edges between labels are cut that are longer than the dense lattice's; ascending by edge.
+    /// Where edges between labels are cut; ascending by edge.
     pub cuts: Vec<EdgeCut>,
 }
 
@@ -182,7 +182,7 @@ impl Layer {
         rest.into_iter().any(|label| label != first)
     }
 
-    /// Cuts of the leaves' edges between labels, but for the shortest edges.
+    /// Cuts of the leaves' edges between labels.
     fn cuts(&self, leaves: &[Leaves], numbers: &[u32]) -> Vec<EdgeCut> {
         let LayerLabels::Mixed(labels) = &self.labels else { return Vec::new() };
         let mixed = leaves.iter().flat_map(|part| &part.tets).filter(|tet| self.is_mixed(tet));
@@ -192,8 +192,9 @@ impl Layer {
         edges.dedup();
         let cut = |edge: [u32; 2]| {
             let crossing = labels.crossing(edge.map(|v| self.vertex(v)))?;
-            let edge = edge.map(|v| numbers[v as usize]);
-            Some(EdgeCut { edge, share: crossing.share, colors: crossing.samples.map(|sample| self.color(sample, 0)) })
+            let share = (crossing.place + self.blend(&crossing)) / crossing.steps as f32;
+            let colors = crossing.samples.map(|sample| self.color(sample, 0));
+            Some(EdgeCut { edge: edge.map(|v| numbers[v as usize]), share, colors })
         };
         edges.into_iter().filter_map(cut).collect()
     }
@@ -203,6 +204,21 @@ impl Layer {
     fn vertex(&self, index: u32) -> [usize; 3] {
         let ([columns, lines, _], index) = (self.importance.size(), index as usize);
         [index % columns, index / columns % lines, index / (columns * lines)]
+    }
+
+    /// How far past halfway between its two samples a crossing lies, in samples: the pixels at an edge are means over their
+    /// squares, so what each has of the other label's colour tells where in it the edge is. Between frames there are no
+    /// means.
+    fn blend(&self, crossing: &Crossing) -> f32 {
+        let [before, after] = crossing.samples;
+        let [first, second] = crossing.beyond.map(|sample| self.color(sample, 0));
+        let jump = first - second;
+        if before[2] != after[2] || jump.length_squared() < LEAST_JUMP {
+            return 0.0;
+        }
+        let part = |color: Vec3| ((color - second).dot(jump) / jump.length_squared()).clamp(0.0, 1.0);
+        let of_first = part(self.color(before, 0)) + part(self.color(after, 0));
+        (of_first - 1.0).clamp(-MOST_BLEND, MOST_BLEND)
     }
 
     fn color(&self, vertex: [usize; 3], level: u8) -> Vec3 {
@@ -223,6 +239,11 @@ impl Layer {
         })
     }
 }
+
+/// Least squared difference of colours, in squared levels over the channels, that tells which of two a blend has more of.
+const LEAST_JUMP: f32 = 200.0;
+/// Furthest from halfway that blends move a crossing, in samples: half would be at a sample.
+const MOST_BLEND: f32 = 0.45;
 
 /// Level of a vertex that no leaf has.
 const ABSENT: u8 = u8::MAX;

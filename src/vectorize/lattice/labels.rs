@@ -36,10 +36,14 @@ pub(super) struct MixedLabels {
 /// Where an edge passes from one label to the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
-    /// How far along the edge, strictly between 0 and 1.
-    pub(super) share: f32,
+    /// How far along the edge, in samples: halfway between two of them.
+    pub(super) place: f32,
+    /// Samples from end to end, less one.
+    pub(super) steps: usize,
     /// The last sample of the first label and the first one of the other.
     pub(super) samples: [[usize; 3]; 2],
+    /// One sample further on either side, if it has the same label: what colour the label has where no pixel is blended.
+    pub(super) beyond: [[usize; 3]; 2],
 }
 
 impl LayerLabels {
@@ -145,21 +149,34 @@ impl MixedLabels {
         (low[0]..).zip(&self.rows[z * self.size[1] + y][low[0]..=high[0]])
     }
 
-    /// Where an edge of the lattice longer than the smallest ones passes between labels, if its ends differ. Were there
-    /// several places, the one that leaves the first label its number of samples.
+    /// Where an edge of the lattice passes between labels, if its ends differ. Were there several places, the one that
+    /// leaves the first label its number of samples.
     pub(super) fn crossing(&self, ends: [[usize; 3]; 2]) -> Option<Crossing> {
         let [start, end] = ends;
         let steps = (0..3).map(|axis| start[axis].abs_diff(end[axis])).max().unwrap_or(0);
         let labels = ends.map(|end| self.at(end));
-        if steps < 2 || labels[0] == labels[1] {
+        if labels[0] == labels[1] {
             return None;
         }
         let sample = |n: usize| std::array::from_fn(|axis| (start[axis] * (steps - n) + end[axis] * n) / steps);
         let is_first = |n: usize| self.at(sample(n)) == labels[0];
         let count = (0..=steps).filter(|&n| is_first(n)).count();
-        let before = (0..count).rev().find(|&n| is_first(n)).unwrap_or(0);
-        let after = (count..steps).find(|&n| self.at(sample(n)) == labels[1]).unwrap_or(steps);
-        Some(Crossing { share: (count as f32 - 0.5) / steps as f32, samples: [before, after].map(sample) })
+        let before = (0..count).rev().find(|&n| is_first(n)).map_or(start, sample);
+        let after = (count..steps).find(|&n| self.at(sample(n)) == labels[1]).map_or(end, sample);
+        let beyond = [self.beyond(before, end, start, steps), self.beyond(after, start, end, steps)];
+        Some(Crossing { place: count as f32 - 0.5, steps, samples: [before, after], beyond })
+    }
+
+    /// The sample after `sample` on the way `from` to `to`, which take `steps`, if it has the same label.
+    fn beyond(&self, sample: [usize; 3], from: [usize; 3], to: [usize; 3], steps: usize) -> [usize; 3] {
+        let next: [Option<usize>; 3] = std::array::from_fn(|axis| {
+            let step = (to[axis] as isize - from[axis] as isize) / steps as isize;
+            sample[axis].checked_add_signed(step).filter(|&n| n < self.size[axis])
+        });
+        match next {
+            [Some(x), Some(y), Some(t)] if self.at([x, y, t]) == self.at(sample) => [x, y, t],
+            _ => sample,
+        }
     }
 }
 
@@ -198,13 +215,18 @@ mod tests {
     }
 
     #[test]
-    fn long_edges_are_cut_between_the_samples_of_their_labels() {
+    fn edges_are_cut_between_the_samples_of_their_labels() {
         let labels = labels(9, |[x, ..]| u32::from(x > 2));
         let crossing = labels.crossing([[0, 0, 8], [8, 8, 8]]).unwrap();
-        assert_eq!(crossing, Crossing { share: 2.5 / 8.0, samples: [[2, 2, 8], [3, 3, 8]] });
-        let back = labels.crossing([[8, 8, 8], [0, 0, 8]]).unwrap();
-        assert_eq!(back, Crossing { share: 5.5 / 8.0, samples: [[3, 3, 8], [2, 2, 8]] });
+        let expected =
+            Crossing { place: 2.5, steps: 8, samples: [[2, 2, 8], [3, 3, 8]], beyond: [[1, 1, 8], [4, 4, 8]] };
+        assert_eq!(crossing, expected);
+        let back = labels.crossing([[3, 0, 8], [2, 0, 8]]).unwrap();
+        let expected =
+            Crossing { place: 0.5, steps: 1, samples: [[3, 0, 8], [2, 0, 8]], beyond: [[4, 0, 8], [1, 0, 8]] };
+        assert_eq!(back, expected);
         assert_eq!(labels.crossing([[0, 0, 0], [0, 8, 0]]), None);
-        assert_eq!(labels.crossing([[2, 0, 0], [3, 0, 0]]), None);
+        let stroke = self::labels(9, |[x, ..]| u32::from(x == 4));
+        assert_eq!(stroke.crossing([[4, 0, 0], [5, 0, 0]]).unwrap().beyond, [[4, 0, 0], [6, 0, 0]]);
     }
 }

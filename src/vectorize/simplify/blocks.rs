@@ -70,6 +70,8 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
 
     /// Simplifies what is not frozen of the window block by block.
     pub fn simplify_blocks(&mut self, unfrozen: Unfrozen, goal: BlockGoal, params: &SimplifyParams) -> SimplifyReport {
+        // What an earlier simplification of the whole has left behind.
+        self.compact();
         let goal = goal.of_one(params.blocks(self.vertices.len()));
         let bands = Bands::new(params.blocks(self.vertices.len()), goal.shift, self.domain);
         let of_tet = bands.of_tets(self.tets.len(), |tet| self.tets[tet].map(|v| self.vertices[v as usize].position));

@@ -1,4 +1,4 @@
-//! Regions joined across boundaries that are weak, or too small to have one.
+//! Regions joined across boundaries that are weak or no jumps, or too small to have one.
 //!
 //! In: pixels with their regions. Out: the same with fewer regions, numbered without gaps.
 
@@ -26,6 +26,8 @@ struct Boundary {
     difference: Vec3,
     size: f32,
     sides: u32,
+    /// Sum over the pixels that both have a part of: from 0, next to nothing, to 1, half.
+    mixed: f32,
 }
 
 impl Boundary {
@@ -33,6 +35,40 @@ impl Boundary {
     fn jump(&self) -> f32 {
         let sides = self.sides as f32;
         0.5 * (self.difference.length() + self.size) / (sides * 3f32.sqrt())
+    }
+
+    /// Whether the colour changes within a pixel. A wider slope is no jump, however steep: colours that change show it best.
+    /// One boundary alone says little, as one along the grid may have half of each pixel: it counts beside what is
+    /// usual.
+    fn is_sharp(&self, usual: Mixed) -> bool {
+        self.mixed + usual.sum <= WIDEST * (self.sides as f32 + usual.sides)
+    }
+}
+
+/// Most [`Boundary::mixed`] of a jump, a side. Where pixels are means over their squares, an edge along the grid has 2/3 a
+/// length; a side stands for 0.8 of an edge's length. Edges through a lens have 0.8 to 2 a length.
+const WIDEST: f32 = 0.65;
+
+/// How much is mixed at the boundaries of a slab so far.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Mixed {
+    /// Of this many sides.
+    sides: f32,
+    /// As [`Boundary::mixed`].
+    sum: f32,
+}
+
+impl Mixed {
+    /// Takes a frame's boundaries in. All together weigh as much as a boundary around the picture, the last frames most.
+    fn follow<'a>(&mut self, boundaries: impl Iterator<Item = &'a Boundary>, raster: Raster) {
+        for boundary in boundaries {
+            self.sides += boundary.sides as f32;
+            self.sum += boundary.mixed;
+        }
+        let around = (2 * (raster.width + raster.height)) as f32;
+        let share = (around / self.sides.max(1.0)).min(1.0);
+        self.sides *= share;
+        self.sum *= share;
     }
 }
 
@@ -47,19 +83,24 @@ pub(super) struct Regions {
     pub(super) beside: Vec<Vec<Region>>,
 }
 
-/// Joins regions.
-pub(super) fn merge(raster: Raster, pixels: &mut [Pixel], rules: MergeRules) -> Regions {
-    let regions = pixels.iter().map(|pixel| pixel.region + 1).max().unwrap_or(0);
+/// Joins regions. `usual` is the slab's so far.
+pub(super) fn merge(raster: Raster, pixels: &mut [Pixel], rules: MergeRules, usual: &mut Mixed) -> Regions {
+    let regions = pixels.iter().map(|pixel| pixel.region.max(pixel.minor) + 1).max().unwrap_or(0);
     let mut forest = Forest::new(regions as usize);
+    let mut is_first = true;
     loop {
         let (boundaries, areas) = survey(raster, pixels, &mut forest, regions as usize);
+        if std::mem::take(&mut is_first) {
+            usual.follow(boundaries.values().filter(|boundary| boundary.jump() >= rules.jump), raster);
+        }
         // Every region's weakest boundary at once (Boruvka 1926): a survey costs more than the rest.
         let mut weakest: Vec<Option<(f32, Region)>> = vec![None; regions as usize];
         for (&(a, b), boundary) in &boundaries {
             for (own, other) in [(a, b), (b, a)] {
                 // A small region has to join someone, but nobody has to join a small region.
                 let is_small = areas[own as usize] < rules.min_area;
-                let jump = boundary.jump() - if is_small { SMALL } else { 0.0 };
+                let jump = if boundary.is_sharp(*usual) { boundary.jump() } else { 0.0 };
+                let jump = jump - if is_small { SMALL } else { 0.0 };
                 if jump < rules.jump && weakest[own as usize].is_none_or(|(least, _)| jump < least) {
                     weakest[own as usize] = Some((jump, other));
                 }
@@ -102,6 +143,12 @@ fn survey(raster: Raster, pixels: &[Pixel], forest: &mut Forest, regions: usize)
         boundary.difference += if a < b { difference } else { -difference };
         boundary.size += difference.length();
         boundary.sides += 1;
+    }
+    for pixel in pixels.iter().filter(|pixel| pixel.minor != pixel.region) {
+        let (a, b) = (forest.root(pixel.region), forest.root(pixel.minor));
+        if let Some(boundary) = boundaries.get_mut(&(a.min(b), a.max(b))) {
+            boundary.mixed += 4.0 * pixel.part * (1.0 - pixel.part);
+        }
     }
     (boundaries, areas)
 }

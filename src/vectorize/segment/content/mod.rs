@@ -10,7 +10,7 @@ mod naming;
 mod unmix;
 mod zones;
 
-use merge::{MergeRules, merge};
+use merge::{MergeRules, Mixed, merge};
 use naming::{Before, Palette};
 use unmix::unmix;
 use zones::find_zones;
@@ -31,6 +31,17 @@ pub(super) struct Pixel {
     pub(super) region: Region,
     /// Its region's colour there, in 8-bit levels.
     pub(super) color: glam::Vec3,
+    /// The other region that it has a part of.
+    pub(super) minor: Region,
+    /// Which part of the pixel its own region has.
+    pub(super) part: f32,
+}
+
+impl Pixel {
+    /// A pixel of one region alone.
+    pub(super) fn pure(region: Region, color: glam::Vec3) -> Self {
+        Self { region, color, minor: region, part: 1.0 }
+    }
 }
 
 /// Where colours vary inside zones, by noise or texture, a jump must be this many times more to be seen.
@@ -45,18 +56,20 @@ pub(super) struct Content {
     params: SegmentParams,
     before: Option<(Frame, Vec<Gray>, LabelPlane)>,
     palette: Palette,
+    usual: Mixed,
 }
 
 impl Content {
     /// For frames of this size, at the start of a slab.
     pub(super) fn new(raster: Raster, params: SegmentParams) -> Self {
-        Self { raster, params, before: None, palette: Palette::default() }
+        Self { raster, params, before: None, palette: Palette::default(), usual: Mixed::default() }
     }
 
     /// Forgets everything: the next frame starts afresh, from label 0.
     pub(super) fn start_slab(&mut self) {
         self.before = None;
         self.palette = Palette::default();
+        self.usual = Mixed::default();
     }
 
     /// The labels of the next frame.
@@ -71,7 +84,7 @@ impl Content {
         let noise = zones.roughness(self.raster, frame);
         let jump = (NOISE_JUMP * noise).clamp(LEAST_JUMP, self.params.jump_levels);
         let rules = MergeRules { jump, min_area: self.params.min_area_px };
-        let regions = merge(self.raster, &mut pixels, rules);
+        let regions = merge(self.raster, &mut pixels, rules, &mut self.usual);
         let levels = pyramid(frame);
         let before = self.before.as_ref().map(|(before, before_levels, labels)| Before {
             frame: before,

@@ -66,7 +66,10 @@ impl Blend {
     /// The pixel of this colour that it accounts for.
     fn pixel(&self, color: Vec3) -> Pixel {
         let alone = self.major.region == self.minor.region || self.part > WHOLE;
-        Pixel { region: self.major.region, color: if alone { color } else { self.major.color } }
+        if alone {
+            return Pixel::pure(self.major.region, color);
+        }
+        Pixel { region: self.major.region, color: self.major.color, minor: self.minor.region, part: self.part }
     }
 }
 
@@ -81,8 +84,7 @@ pub(super) fn unmix(raster: Raster, frame: &Frame, zones: &Zones) -> Vec<Pixel> 
     (0..raster.len())
         .map(|p| {
             if zones.of_pixel[p] != IMPURE {
-                let region = zones.of_pixel[p];
-                return Pixel { region, color: colors[p] };
+                return Pixel::pure(zones.of_pixel[p], colors[p]);
             }
             strokes.account(raster, &colors, p, &near[p], blends[p])
         })
@@ -160,7 +162,7 @@ impl Strokes {
         let is_purer = |q: &usize| own == IMPURE || (!zones.is_empty() && self.strangeness[*q] > self.strangeness[p]);
         // A pixel of a stroke is at worst the purest itself; any other without a stroke nearby has a blend.
         let Some(purest) = strangest.filter(is_purer).or((own != IMPURE).then_some(p)) else {
-            return blend.map_or(Pixel { region: 0, color }, |blend| blend.pixel(color));
+            return blend.map_or(Pixel::pure(0, color), |blend| blend.pixel(color));
         };
         let region = if own == IMPURE { self.of_pixel[purest] } else { own };
         let stroke = Candidate { region, color: colors[purest] };
