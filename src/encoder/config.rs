@@ -75,8 +75,9 @@ pub struct EncoderConfig {
     pub window: u32,
     /// Most frames from one keyframe to the next, [`Self::KEY_INT_MAX`].
     pub key_int_max: u32,
-    /// Mean number of superpixels a frame; 0: chosen by content; 1: no discontinuities, which reaches the lowest error at
-    /// a given ratio as long as surfaces are fitted to pixel labels (docs/benchmarks.md).
+    /// Mean number of superpixels a frame; 0: discontinuities where the content has them, none in pictures of a camera; 1:
+    /// none, which reaches the lowest error at native size: what moves by more than its width a frame is torn between
+    /// labels (docs/benchmarks.md).
     pub superpixels: u32,
     /// Levels of subdivision that the decoder is to draw with, and the fit fits for: 0 to 2. Level 0 reaches the lowest
     /// error and the sharpest edges, level 1 smoother pictures when enlarged.

@@ -185,7 +185,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     }
 
     fn take(&mut self, frame: Arc<Frame>, labels: LabelPlane) {
-        self.is_cut |= labels.labels().iter().any(|label| *label != labels.labels()[0]);
+        self.is_cut |= !labels.is_uniform();
         self.simplify_params.topology = self.topologies()[0];
         self.volume.push(frame.clone());
         self.labels.push_back((self.planes, labels.clone()));

@@ -36,6 +36,11 @@ impl LabelPlane {
         self.height
     }
 
+    /// Whether all pixels have one label.
+    pub fn is_uniform(&self) -> bool {
+        self.labels.iter().all(|label| *label == self.labels[0])
+    }
+
     /// All labels, row-major.
     pub fn labels(&self) -> &[Label] {
         &self.labels

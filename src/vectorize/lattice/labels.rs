@@ -49,7 +49,7 @@ pub(super) struct Crossing {
 impl LayerLabels {
     pub(super) fn new(axes: &[Axis; 3], planes: &[LabelPlane]) -> Self {
         let first = planes[0].labels()[0];
-        if planes.iter().all(|plane| plane.labels().iter().all(|&label| label == first)) {
+        if planes.iter().all(|plane| plane.is_uniform() && plane.labels()[0] == first) {
             return Self::Uniform(first);
         }
         let [columns, lines, times] = axes.each_ref().map(Axis::lines);

@@ -313,6 +313,27 @@ fn tiny_frames_and_noise_do_no_harm() {
 }
 
 #[test]
+fn what_a_lens_blurs_is_no_jump() {
+    // Edges that take `width` pixels from dark to bright.
+    let frames = |width: f32| -> Vec<Frame> {
+        let frame = |k: usize| {
+            let center = [40.0 + 3.0 * k as f32, 36.0];
+            draw(96, 72, |x, y| {
+                let distance = (x - center[0]).hypot(y - center[1]) - 16.0;
+                let inside = (0.5 - distance / width.max(1e-3)).clamp(0.0, 1.0);
+                [40.0 + 180.0 * inside, 60.0 + 90.0 * inside, 80.0]
+            })
+        };
+        (0..10).map(frame).collect()
+    };
+    for (width, labels) in [(0.0, 2), (0.5, 2), (3.0, 1), (5.0, 1)] {
+        let planes = push_all(&mut Segmenter::new(96, 72, SegmentParams::new(0)), &frames(width));
+        let found: BTreeSet<Label> = planes.iter().flat_map(labels_of).collect();
+        assert_eq!(found.len(), labels, "edges of {width} pixels");
+    }
+}
+
+#[test]
 fn labels_have_no_small_islands() {
     let frame = draw(120, 90, |x, y| {
         let spot = ((x / 9.0).fract() - 0.5).hypot((y / 9.0).fract() - 0.5) * 9.0;

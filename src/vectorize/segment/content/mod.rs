@@ -86,14 +86,20 @@ impl Content {
         let rules = MergeRules { jump, min_area: self.params.min_area_px };
         let regions = merge(self.raster, &mut pixels, rules, &mut self.usual);
         let levels = pyramid(frame);
-        let before = self.before.as_ref().map(|(before, before_levels, labels)| Before {
-            frame: before,
-            labels,
-            motion: MotionField::estimate(&levels, before_levels),
-        });
-        let names = self.palette.name(self.raster, frame, &pixels, &regions, before);
-        let labels = pixels.iter().map(|pixel| Label(names[pixel.region as usize])).collect();
-        let plane = LabelPlane::new(frame.width(), frame.height(), labels);
+        let plane = match &self.before {
+            // Whatever moved, there is nothing that a name would tell apart.
+            Some((_, _, labels)) if regions.areas.len() == 1 && labels.is_uniform() => labels.clone(),
+            before => {
+                let before = before.as_ref().map(|(before, before_levels, labels)| Before {
+                    frame: before,
+                    labels,
+                    motion: MotionField::estimate(&levels, before_levels),
+                });
+                let names = self.palette.name(self.raster, frame, &pixels, &regions, before);
+                let labels = pixels.iter().map(|pixel| Label(names[pixel.region as usize])).collect();
+                LabelPlane::new(frame.width(), frame.height(), labels)
+            }
+        };
         self.before = Some((frame.clone(), levels, plane.clone()));
         plane
     }
