@@ -4,6 +4,7 @@ mod pipeline;
 
 use gst::ClockTime;
 use gst::prelude::*;
+use gst_controller::prelude::*;
 use gst_video::prelude::*;
 use pipeline::{Outcome, RATE, Running, SIZE, TempFile, encode, init, packets, raw, run, stream, time_of};
 
@@ -400,6 +401,28 @@ fn a_viewport_may_change_while_playing() {
     assert_eq!(dark[..5], [true; 5], "the property is set after the fifth picture");
     let whole = view(&file, "", (48, 32));
     assert!(plane(&outcome.samples[9], 0) == plane(&whole.samples[9], 0));
+}
+
+#[test]
+fn a_controller_pans_picture_by_picture() {
+    let file = TempFile::new(&stream(10));
+    let caps = "video/x-raw,format=RGB,width=96,height=64";
+    let window = "viewport-y=8 viewport-width=24 viewport-height=16";
+    let description = format!("{} ! tetvecparse ! tetvecdec name=decoder {window} ! {caps}", file.source());
+    let running = Running::new(&description);
+    let decoder = running.element("decoder");
+    let path = gst_controller::InterpolationControlSource::new();
+    path.set_property("mode", gst_controller::InterpolationMode::Linear);
+    assert!(path.set(time_of(0), 2.0) && path.set(time_of(8), 18.0));
+    let binding = gst_controller::DirectControlBinding::new_absolute(&decoder, "viewport-x", &path);
+    decoder.add_control_binding(&binding).expect("a property that can be controlled");
+    let panned = running.finish().expect_clean();
+    for frame in [0, 3, 8] {
+        let still = view(&file, &format!("{window} viewport-x={}", 2 * frame + 2), (96, 64));
+        let (found, expected) = (plane(&panned.samples[frame], 0), plane(&still.samples[frame], 0));
+        assert!(found.iter().zip(&expected).all(|(a, b)| a.abs_diff(*b) <= 1), "frame {frame}");
+    }
+    assert_ne!(plane(&panned.samples[0], 0), plane(&panned.samples[8], 0));
 }
 
 #[test]
