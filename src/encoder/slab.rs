@@ -104,7 +104,9 @@ pub(super) struct SlabEncoder<Q> {
     kept: u32,
     /// Packets that are fitted and written together, to look at each frame less often.
     batch: u32,
-    /// Fits on the way to the simplification ratio, where the window is the slab.
+    /// Whether the window holds the slab as a whole and there is a number of vertices to come to.
+    has_stages: bool,
+    /// Fits on the way to the simplification ratio, where there are stages.
     refits: u32,
     /// [`RUN_RATIO`], or what the first of these fits needs.
     run_ratio: f64,
@@ -141,7 +143,6 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             duration: EncoderConfig::KEY_INT_MAX.end() + 1,
             subpixel_bits: header.subpixel_bits,
         };
-        // Stages need the whole slab in the window, and a number of vertices to come to.
         let has_stages = config.kept_frames() == u32::MAX && config.target_error <= 0.0;
         let refits = if has_stages { config.refits } else { 0 };
         Ok(Self {
@@ -151,6 +152,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             proof: Proof::new(config),
             kept: config.kept_frames(),
             batch: config.window,
+            has_stages,
             refits,
             run_ratio: RUN_RATIO.max(refits::first_stage(refits)),
             topology: config.topology,
@@ -282,7 +284,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
 
     /// Simplifies the window to its goal, or as far as it goes.
     fn simplify_to(&mut self, unfrozen: Unfrozen, goal: Goal, observer: &mut Observer) {
-        if self.kept == u32::MAX && !self.is_steered() {
+        if self.has_stages {
             for pass in &WINDOW_PASSES {
                 self.simplify_blocks(unfrozen, (pass.ratio * goal.vertices as f64) as usize, pass.shift, observer);
             }
