@@ -337,7 +337,7 @@ fn the_preset_decides_what_is_not_set() {
         assert_eq!(element.property::<u32>("refits"), config.refits, "{nick}");
         assert_eq!(element.property::<u32>("key-int-max"), defaults.key_int_max, "{nick}");
         let choices = ["lattice", "topology", "error-metric"].map(|property| written(&element, property));
-        let expected = if nick == "paper" { ["dense", "strict", "paper"] } else { ["adaptive", "free", "colour"] };
+        let expected = if nick == "paper" { ["dense", "strict", "paper"] } else { ["adaptive", "auto", "colour"] };
         assert_eq!(choices, expected, "{nick}");
     }
 }
