@@ -1,7 +1,7 @@
 //! Where a simplex of the lattice has its cut, triple or quadruple point.
 //!
-//! In: positions of its corners, of a long edge also where its labels meet. Out: a position strictly inside. Forbidden here: anything beyond the simplex, so that
-//! all who share it agree.
+//! In: positions of its corners; of an edge of the adaptive lattice also how far along its labels meet. Out: a position
+//! strictly inside. Forbidden here: anything beyond the simplex, so that all who share it agree.
 
 use glam::IVec3;
 

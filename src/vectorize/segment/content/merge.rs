@@ -87,12 +87,9 @@ pub(super) struct Regions {
 pub(super) fn merge(raster: Raster, pixels: &mut [Pixel], rules: MergeRules, usual: &mut Mixed) -> Regions {
     let regions = pixels.iter().map(|pixel| pixel.region.max(pixel.minor) + 1).max().unwrap_or(0);
     let mut forest = Forest::new(regions as usize);
-    let mut is_first = true;
+    let (mut boundaries, mut areas) = survey(raster, pixels, &mut forest, regions as usize);
+    usual.follow(boundaries.values().filter(|boundary| boundary.jump() >= rules.jump), raster);
     loop {
-        let (boundaries, areas) = survey(raster, pixels, &mut forest, regions as usize);
-        if std::mem::take(&mut is_first) {
-            usual.follow(boundaries.values().filter(|boundary| boundary.jump() >= rules.jump), raster);
-        }
         // Every region's weakest boundary at once (Boruvka 1926): a survey costs more than the rest.
         let mut weakest: Vec<Option<(f32, Region)>> = vec![None; regions as usize];
         for (&(a, b), boundary) in &boundaries {
@@ -117,6 +114,7 @@ pub(super) fn merge(raster: Raster, pixels: &mut [Pixel], rules: MergeRules, usu
                 forest.join(own, *other);
             }
         }
+        (boundaries, areas) = survey(raster, pixels, &mut forest, regions as usize);
     }
 }
 
