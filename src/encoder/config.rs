@@ -28,7 +28,7 @@ pub enum LatticeKind {
 /// How strictly the simplification keeps the topology of labels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TopologyRule {
-    /// Strictly as far as the goal can be reached, then freely: thin strokes stay whole.
+    /// Changes have their price: thin strokes stay whole as long as little else is lost for it.
     #[default]
     Auto,
     /// Labels may merge and pinch from the start.

@@ -27,6 +27,9 @@ const TRANSITION_RATIO: f64 = 0.1;
 /// the window, where they compete with all others. More where its first stage has more.
 const RUN_RATIO: f64 = 2.0;
 
+/// The same where labels differ: what blocks have frozen, planes dense with borders, lets less of them go cheaply.
+const CUT_RUN_RATIO: f64 = 4.0;
+
 /// How many times the vertices that a window is to have it may grow to before its blocks are simplified.
 const GROWTH: f64 = 1.5;
 
@@ -188,7 +191,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
 
     fn take(&mut self, frame: Arc<Frame>, labels: LabelPlane) {
         self.is_cut |= !labels.is_uniform();
-        self.simplify_params.topology = self.topologies()[0];
+        self.simplify_params.topology = self.topology();
         self.volume.push(frame.clone());
         self.labels.push_back((self.planes, labels.clone()));
         self.runs.push(frame, labels);
@@ -220,18 +223,23 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         if self.is_steered() {
             return BlockGoal { keep: 0.0, max_error: RUN_ERROR * self.allowed_error(pixels), shift: 0.0 };
         }
-        let keep = self.run_ratio * self.ratio * pixels / run.positions.len() as f64;
+        let keep = self.run_ratio() * self.ratio * pixels / run.positions.len() as f64;
         BlockGoal { keep: keep.min(1.0), max_error: f32::INFINITY, shift: 0.0 }
     }
 
-    /// In which order topologies are tried until the goal is reached.
-    fn topologies(&self) -> &'static [Topology] {
+    /// What is kept of the topology of labels, as far as there are any.
+    fn topology(&self) -> Topology {
         match self.topology {
             // Of one label there is no more to keep than positive tets keep.
-            TopologyRule::Auto if self.is_cut => &[Topology::Strict, Topology::Free],
-            TopologyRule::Auto | TopologyRule::Free => &[Topology::Free],
-            TopologyRule::Strict => &[Topology::Strict],
+            TopologyRule::Auto if self.is_cut => Topology::Priced,
+            TopologyRule::Auto | TopologyRule::Free => Topology::Free,
+            TopologyRule::Strict => Topology::Strict,
         }
+    }
+
+    /// Vertices that the window may have over those that the simplification ratio allows, before the slab ends.
+    fn run_ratio(&self) -> f64 {
+        if self.is_cut { self.run_ratio.max(CUT_RUN_RATIO) } else { self.run_ratio }
     }
 
     /// Whether the error decides, not the ratio.
@@ -267,11 +275,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         }
         self.refit(unfrozen, goal.vertices, observer)?;
         observer.tell(Event::Began(Stage::Simplify));
-        for &topology in self.topologies() {
-            self.simplify_params.topology = topology;
-            self.simplify_to(unfrozen, goal, observer);
-        }
-        self.simplify_params.topology = self.topologies()[0];
+        self.simplify_to(unfrozen, goal, observer);
         observer.tell(Event::Ended);
         self.frozen = match frames {
             Some(_) => i32::MAX,
@@ -319,7 +323,9 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             vertices: if steered { 0 } else { allowed(trailing.into()) },
             before: if frames.is_some() { i32::MAX } else { trailing as i32 * unit },
             vertices_in_window: match frames {
-                None if !steered => (self.run_ratio * allowed(lead.into()) as f64 + TRANSITION_RATIO * pixels) as usize,
+                None if !steered => {
+                    (self.run_ratio() * allowed(lead.into()) as f64 + TRANSITION_RATIO * pixels) as usize
+                }
                 _ => usize::MAX,
             },
             max_cost: f32::MAX,

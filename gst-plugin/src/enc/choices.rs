@@ -70,9 +70,9 @@ impl From<tetvec::LatticeKind> for Lattice {
 #[enum_type(name = "GstTetvecEncTopology")]
 #[repr(i32)]
 pub enum Topology {
-    /// Strict as far as the goal can be reached, then free.
+    /// Changes have their price.
     #[default]
-    #[enum_value(name = "Strict as far as the goal can be reached, then free", nick = "auto")]
+    #[enum_value(name = "What changes it has its price", nick = "auto")]
     Auto = 0,
     /// Regions may merge and pinch.
     #[enum_value(name = "Regions may merge and pinch", nick = "free")]

@@ -74,7 +74,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         self.work = WorkMesh::new(self.committed.domain);
         let keep = (wanted / mesh.positions.len() as f64).min(1.0);
         let goal = BlockGoal { keep, max_error: f32::INFINITY, shift: 0.5 };
-        let report = self.work.append_simplified(mesh, goal, &self.simplify_params);
+        let report = self.work.append_fitted(mesh, goal, &self.simplify_params);
         log::debug!("blocks of a stage: {report:?}");
         observer.tell(Event::Simplified(report));
     }

@@ -14,7 +14,7 @@ const PART: f64 = 0.75;
 /// Squared gradient at which the price is as it is without labels: that of camera pictures, in squared levels a channel.
 const USUAL: f64 = 1.0;
 /// Most that the price is multiplied by.
-const MOST: f64 = 100.0;
+const MOST: f64 = 200.0;
 /// One frame in so many is looked at.
 const EVERY: usize = 4;
 

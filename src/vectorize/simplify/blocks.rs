@@ -11,7 +11,7 @@ use glam::IVec3;
 use super::SimplifyParams;
 use super::collapse::{Goal, SimplifyReport, Unfrozen, simplify};
 use super::quadric::{PositionQuadric, WedgeQuadric};
-use super::surfaces::surface_quadrics;
+use super::surfaces::{face_quadrics, surface_quadrics};
 use super::work_mesh::{NONE, WorkMesh};
 use crate::mesh::{Domain, Sides, TetMesh};
 use crate::vectorize::parallel::{for_each, map};
@@ -41,9 +41,23 @@ impl BlockGoal {
 impl<Q: WedgeQuadric> WorkMesh<Q> {
     /// Appends a run as [`WorkMesh::append`] does, after simplifying its blocks.
     pub fn append_simplified(&mut self, run: &TetMesh, goal: BlockGoal, params: &SimplifyParams) -> SimplifyReport {
+        self.append_blocks(run, surface_quadrics(run, params.surface_weight), goal, params)
+    }
+
+    /// The same with a fitted mesh, whose surfaces are where they belong.
+    pub fn append_fitted(&mut self, mesh: &TetMesh, goal: BlockGoal, params: &SimplifyParams) -> SimplifyReport {
+        self.append_blocks(mesh, face_quadrics(mesh, params.surface_weight), goal, params)
+    }
+
+    fn append_blocks(
+        &mut self,
+        run: &TetMesh,
+        surfaces: HashMap<u32, PositionQuadric>,
+        goal: BlockGoal,
+        params: &SimplifyParams,
+    ) -> SimplifyReport {
         let goal = goal.of_one(params.blocks(run.positions.len()));
         let Split { parts, numbers } = split(run, goal.shift, params);
-        let surfaces = surface_quadrics(run, params.surface_weight);
         let blocks = map(parts, |part| {
             let mut mesh = Self::new(self.domain);
             mesh.fill(run, &part, (&numbers, &surfaces), params);

@@ -3,8 +3,9 @@
 use glam::{IVec3, Vec3};
 
 use super::SimplifyParams;
-use super::legality::{Limits, Marks, Refusal, RefusalCounts, Topology};
-use super::quadric::{PositionQuadric, WedgeQuadric};
+use super::legality::{Limits, Marks, RefusalCounts, Topology};
+use super::proposal::{Proposal, Proposer};
+use super::quadric::WedgeQuadric;
 use super::queue::{BucketQueue, Entry};
 use super::stars::Stars;
 use super::work_mesh::{NONE, WorkMesh};
@@ -77,15 +78,8 @@ impl SimplifyReport {
     }
 }
 
-/// Where an edge's merged vertex would go, and what it would cost.
-#[derive(Debug, Clone, Copy)]
-struct Proposal {
-    position: IVec3,
-    cost: f32,
-}
-
 /// Refusals of one edge before it is put aside until the queue is empty.
-const MOST_ATTEMPTS: u32 = 4;
+const MOST_ATTEMPTS: u16 = 4;
 /// Buckets by which a refused edge is put back: an octave of cost.
 const SETBACK: usize = 16;
 /// Most binary digits of a slot's number in the table of entries known to be queued already.
@@ -149,7 +143,7 @@ pub fn simplify<Q: WedgeQuadric>(
         known_bits,
         report,
         star: Vec::new(),
-        marks: Marks::new(if params.topology == Topology::Strict { vertices } else { 0 }),
+        marks: Marks::new(if params.topology == Topology::Free { 0 } else { vertices }),
     };
     run.rank_edges();
     run.collapse();
@@ -199,14 +193,17 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
             neighbors.sort_unstable();
             neighbors.dedup();
             for &v in &neighbors {
-                if self.is_frozen(u) && self.is_frozen(v) {
+                if self.proposer().is_frozen(u) && self.proposer().is_frozen(v) {
                     continue;
                 }
                 evaluations += 1;
-                match self.propose(u, v) {
+                match self.proposer().propose(u, v) {
                     Ok(proposal) => {
                         let stamp = self.mesh.stamp(u, v);
-                        ranked.push((BucketQueue::bucket(proposal.cost), Entry { u, v, stamp, attempts: 0 }));
+                        ranked.push((
+                            BucketQueue::bucket(proposal.cost),
+                            Entry { u, v, stamp, attempts: 0, paid: false },
+                        ));
                     }
                     Err(refusal) => refusals.note(refusal),
                 }
@@ -226,7 +223,7 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
                 }
                 collapses_before = self.report.collapses;
                 for entry in std::mem::take(&mut self.aside) {
-                    self.queue.push(0, Entry { stamp: NONE, attempts: 0, ..entry });
+                    self.queue.push(0, Entry { stamp: NONE, attempts: 0, paid: false, ..entry });
                 }
                 continue;
             };
@@ -258,10 +255,10 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
             self.known[slot as usize] = [u, v, stamp];
         }
         self.report.evaluations += 1;
-        match self.propose(u, v) {
+        match self.proposer().propose(u, v) {
             Ok(proposal) if is_current => return Some((entry, proposal)),
             Ok(proposal) => {
-                let renewed = Entry { u, v, stamp, attempts: 0 };
+                let renewed = Entry { u, v, stamp, attempts: 0, paid: false };
                 let due = BucketQueue::bucket(proposal.cost);
                 if due <= bucket {
                     return Some((renewed, proposal));
@@ -275,19 +272,43 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
 
     fn try_collapse(&mut self, bucket: usize, entry: Entry, proposal: Proposal) {
         let (u, v) = (entry.u, entry.v);
-        let link =
-            if self.params.topology == Topology::Strict { self.mesh.check_link(u, v, &mut self.marks) } else { Ok(()) };
-        match link.and_then(|()| self.mesh.check_geometry([u, v], proposal.position, &self.limits)) {
+        if self.params.topology != Topology::Free
+            && !entry.paid
+            && !proposal.is_priced
+            && let Err(refusal) = self.mesh.check_link(u, v, &mut self.marks)
+        {
+            self.report.refusals.note(refusal);
+            if self.params.topology == Topology::Strict {
+                return self.put_back(bucket, entry);
+            }
+            let due = BucketQueue::bucket(proposal.cost + self.proposer().topology_price(u, v));
+            return self.queue.push(due.max(bucket), Entry { paid: true, ..entry });
+        }
+        match self.mesh.check_geometry([u, v], proposal.position, &self.limits) {
             Ok(()) => self.perform(u, v, proposal),
             Err(refusal) => {
                 self.report.refusals.note(refusal);
-                let entry = Entry { attempts: entry.attempts + 1, ..entry };
-                if entry.attempts < MOST_ATTEMPTS {
-                    self.queue.push((bucket + SETBACK).min(BucketQueue::bucket(f32::MAX)), entry);
-                } else {
-                    self.aside.push(entry);
+                match self.other_place(u, v, bucket + SETBACK) {
+                    Some(other) => self.perform(u, v, other),
+                    None => self.put_back(bucket, entry),
                 }
             }
+        }
+    }
+
+    /// Another place for the merged vertex where tets stay positive, at no more than the cost of a bucket.
+    fn other_place(&self, u: u32, v: u32, most: usize) -> Option<Proposal> {
+        let places = self.proposer().other_places(u, v)?;
+        let affordable = places.into_iter().filter(|place| BucketQueue::bucket(place.cost) <= most);
+        affordable.into_iter().find(|place| self.mesh.check_geometry([u, v], place.position, &self.limits).is_ok())
+    }
+
+    fn put_back(&mut self, bucket: usize, entry: Entry) {
+        let entry = Entry { attempts: entry.attempts + 1, ..entry };
+        if entry.attempts < MOST_ATTEMPTS {
+            self.queue.push((bucket + SETBACK).min(BucketQueue::bucket(f32::MAX)), entry);
+        } else {
+            self.aside.push(entry);
         }
     }
 
@@ -300,116 +321,13 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
         v
     }
 
-    fn is_frozen(&self, v: u32) -> bool {
-        let vertex = &self.mesh.vertices[v as usize];
-        vertex.frozen || self.unfrozen.freezes(vertex.position.z)
-    }
-
-    /// Position and cost of merging `u` and `v`; costs nothing but arithmetic on the two.
-    fn propose(&self, u: u32, v: u32) -> Result<Proposal, Refusal> {
-        let mesh = &*self.mesh;
-        let (fixed_u, fixed_v) = (self.is_frozen(u), self.is_frozen(v));
-        if fixed_u && fixed_v {
-            return Err(Refusal::Frozen);
-        }
-        let (sides_u, sides_v) = (mesh.vertices[u as usize].sides, mesh.vertices[v as usize].sides);
-        let sides = sides_u.or(sides_v);
-        if sides != sides_u && sides != sides_v {
-            return Err(Refusal::Sides);
-        }
-        // The frozen end, else the one of higher category, keeps its place in the axes in which it is bound.
-        let bound = if fixed_u || (!fixed_v && sides_u == sides) { u } else { v };
-        if mesh.vertices[bound as usize].sides != sides {
-            return Err(Refusal::Sides);
-        }
-        if self.params.topology == Topology::Strict {
-            mesh.check_labels(u, v)?;
-        }
-        let total = self.merged_quadric(u, v, bound);
-        let origin = mesh.vertices[bound as usize].position;
-        if fixed_u || fixed_v || self.keeps_place(u, v, bound) {
-            return Ok(Proposal { position: origin, cost: total.at(Vec3::ZERO) });
-        }
-        let axis = |low: u8, high: u8| (sides.0 & (low | high) != 0).then_some(0.0);
-        let fixed = [axis(1, 2), axis(4, 8), axis(16, 32)];
-        Ok(self.best_position(&total, [u, v], origin, fixed))
-    }
-
-    /// Under strict topology the vertex of higher class stays where it is.
-    fn keeps_place(&self, u: u32, v: u32, bound: u32) -> bool {
-        let other = if bound == u { v } else { u };
-        self.params.topology == Topology::Strict && self.mesh.wedges(bound).count() > self.mesh.wedges(other).count()
-    }
-
-    /// The quadric of the merged vertex, about the position of `origin` (one of the two).
-    fn merged_quadric(&self, u: u32, v: u32, origin: u32) -> PositionQuadric {
-        let mesh = &*self.mesh;
-        let other = if origin == u { v } else { u };
-        let shift = mesh.offset(mesh.vertices[other as usize].position, mesh.vertices[origin as usize].position);
-        let (own, others) = (&mesh.vertices[origin as usize].first, &mesh.vertices[other as usize].first);
-        if own.label == others.label && [own.next, others.next] == [NONE; 2] {
-            // Inside a label, as most are, the loops below come down to this.
-            let mut quadric = own.quadric;
-            quadric.add(&others.quadric.recentered(shift));
-            return quadric.reduced();
-        }
-        let mut total = PositionQuadric::default();
-        for wedge in mesh.wedges(origin) {
-            let mut quadric = wedge.quadric;
-            if let Some(twin) = mesh.wedge(other, wedge.label) {
-                quadric.add(&twin.quadric.recentered(shift));
-            }
-            total.add_scaled(&quadric.reduced(), 1.0);
-        }
-        for wedge in mesh.wedges(other).filter(|wedge| mesh.wedge(origin, wedge.label).is_none()) {
-            total.add_scaled(&wedge.quadric.recentered(shift).reduced(), 1.0);
-        }
-        if let Some(surface) = mesh.surfaces.get(mesh.vertices[origin as usize].surface as usize) {
-            total.add_scaled(surface, 1.0);
-        }
-        if let Some(surface) = mesh.surfaces.get(mesh.vertices[other as usize].surface as usize) {
-            total.add_scaled(&surface.recentered(shift), 1.0);
-        }
-        total
-    }
-
-    /// The lattice point that costs least among the minimiser's, the ends' and the middle's; the minimiser is trusted
-    /// only near the edge.
-    fn best_position(
-        &self,
-        total: &PositionQuadric,
-        ends: [u32; 2],
-        origin: IVec3,
-        fixed: [Option<f32>; 3],
-    ) -> Proposal {
-        let mesh = &*self.mesh;
-        let unit = mesh.domain.unit() as f32;
-        let [a, b] = ends.map(|v| mesh.vertices[v as usize].position);
-        let at = |position: IVec3| Proposal { position, cost: total.at(mesh.offset(origin, position)) };
-        let middle = mesh.offset(origin, a).midpoint(mesh.offset(origin, b));
-        let reach = 2.0 * mesh.offset(a, b).length();
-        if let Some(x) = total.minimizer(fixed).filter(|x| x.distance(middle) <= reach) {
-            return at(origin + (x * unit).round().as_ivec3());
-        }
-        let mut middle = (a + b) / 2;
-        for axis in 0..3 {
-            if fixed[axis].is_some() {
-                middle[axis] = origin[axis];
-            }
-        }
-        let bound_to = |p: IVec3| (0..3).all(|axis| fixed[axis].is_none() || p[axis] == origin[axis]);
-        let mut best = at(middle);
-        for proposal in [a, b].into_iter().filter(|&p| bound_to(p)).map(at) {
-            if proposal.cost < best.cost {
-                best = proposal;
-            }
-        }
-        best
+    fn proposer(&self) -> Proposer<'_, Q> {
+        Proposer { mesh: self.mesh, unfrozen: self.unfrozen, params: self.params }
     }
 
     /// Merges the two ends. A frozen or committed end keeps its number, else the one with the larger star.
     fn perform(&mut self, u: u32, v: u32, proposal: Proposal) {
-        let handed_on = |w: u32| self.mesh.committed[w as usize] != NONE || self.is_frozen(w);
+        let handed_on = |w: u32| self.mesh.committed[w as usize] != NONE || self.proposer().is_frozen(w);
         let larger = self.mesh.stars.star(u).len() >= self.mesh.stars.star(v).len();
         let keep_u = if handed_on(u) != handed_on(v) { handed_on(u) } else { larger };
         let (kept, gone) = if keep_u { (u, v) } else { (v, u) };

@@ -4,7 +4,7 @@ use glam::IVec3;
 
 use super::quadric::WedgeQuadric;
 use super::work_mesh::WorkMesh;
-use crate::mesh::volume6;
+use crate::mesh::{FACES, volume6};
 use crate::video::Label;
 
 /// Why a collapse was refused.
@@ -16,7 +16,7 @@ pub enum Refusal {
     Sides,
     /// Strict topology: the ends' labels are such that merging would pinch or join label surfaces.
     Labels,
-    /// Strict topology: the ends share a neighbour without sharing the face between (link condition).
+    /// Strict topology: surfaces between labels join both ends to a third vertex without a face of all three (link condition).
     Link,
     /// A tet would turn over or become too small to survive rounding.
     Flip,
@@ -61,6 +61,9 @@ pub enum Topology {
     /// better quality.
     #[default]
     Free,
+    /// What [`Self::Strict`] forbids has a price ([`super::SimplifyParams::topology_price`]): what keeps topology goes first, and
+    /// the noise in it, that of strokes that move by more than they are wide, gives way before all else does.
+    Priced,
     /// A vertex merges only into one whose labels include its own, along an edge of the surface they share, and under
     /// the link condition; the merged vertex stays where the one of higher category was (§IV-A3).
     Strict,
@@ -181,19 +184,46 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         shared.any(|&t| self.labels[t as usize] == label)
     }
 
-    /// The link condition: a vertex next to both ends must share a tet with them. Dey, Edelsbrunner, Guha, Nekhayev,
-    /// "Topology preserving edge contraction", 1999.
+    /// The link condition on the surfaces between labels: a vertex that they join to both ends must share a face of them
+    /// with both, and no face may lie between the same two vertices as seen from both ends. Dey, Edelsbrunner, Guha,
+    /// Nekhayev, "Topology preserving edge contraction", 1999. Inside of labels positive tets are all that is to be kept.
     pub(super) fn check_link(&self, u: u32, v: u32, marks: &mut Marks) -> Result<(), Refusal> {
+        if [u, v].iter().any(|&w| self.wedges(w).count() == 1) {
+            return Ok(());
+        }
         let (near, shared) = marks.two();
-        let tets = |of: u32| self.stars.star(of).iter().map(|&t| self.tets[t as usize]);
-        for tet in tets(v) {
-            tet.into_iter().for_each(|w| marks.set(w, near));
+        let [mut at_u, mut at_v] = std::mem::take(&mut marks.faces);
+        self.surface_faces(u, &mut at_u);
+        self.surface_faces(v, &mut at_v);
+        at_v.iter().for_each(|(face, _)| face.iter().for_each(|&w| marks.set(w, near)));
+        let common = at_v.iter().filter(|(face, _)| face.contains(&u));
+        common.for_each(|(face, _)| face.iter().for_each(|&w| marks.set(w, shared)));
+        let is_apart = |&w: &u32| w != v && marks.has(w, near);
+        let is_opposite = |face: &[u32; 2]| at_v.binary_search_by_key(face, |(other, _)| *other).is_ok();
+        let is_linked = !at_u.iter().any(|(face, _)| face.iter().any(is_apart) || is_opposite(face));
+        marks.faces = [at_u, at_v];
+        if is_linked { Ok(()) } else { Err(Refusal::Link) }
+    }
+
+    /// The faces between labels at `v`, ascending: their other two corners, and one of the labels.
+    fn surface_faces(&self, v: u32, faces: &mut Vec<([u32; 2], Label)>) {
+        faces.clear();
+        for &tet in self.stars.star(v) {
+            let (corners, label) = (self.tets[tet as usize], self.labels[tet as usize]);
+            let at = corners.iter().position(|&w| w == v).unwrap_or(0);
+            let [a, b, c] = FACES[at].map(|corner| corners[corner]);
+            faces.extend([[a, b], [b, c], [c, a]].map(|[a, b]| ([a.min(b), a.max(b)], label)));
         }
-        for tet in tets(v).filter(|tet| tet.contains(&u)) {
-            tet.into_iter().for_each(|w| marks.set(w, shared));
+        faces.sort_unstable_by_key(|(face, _)| *face);
+        let mut kept = 0;
+        for n in 1..faces.len() {
+            let [(face, label), other] = [faces[n - 1], faces[n]];
+            if face == other.0 && label != other.1 {
+                faces[kept] = other;
+                kept += 1;
+            }
         }
-        let is_apart = |w: u32| w != v && marks.has(w, near);
-        if tets(u).flatten().any(is_apart) { Err(Refusal::Link) } else { Ok(()) }
+        faces.truncate(kept);
     }
 }
 
@@ -202,11 +232,13 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
 pub(super) struct Marks {
     of: Vec<u32>,
     last: u32,
+    /// Memory for the faces around both ends of an edge.
+    faces: [Vec<([u32; 2], Label)>; 2],
 }
 
 impl Marks {
     pub(super) fn new(vertices: usize) -> Self {
-        Self { of: vec![0; vertices], last: 0 }
+        Self { of: vec![0; vertices], last: 0, faces: Default::default() }
     }
 
     /// Two marks that no vertex has.

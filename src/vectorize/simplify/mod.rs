@@ -8,6 +8,7 @@ mod blocks;
 mod collapse;
 mod commit;
 mod legality;
+mod proposal;
 mod quadric;
 mod queue;
 mod stars;
@@ -37,6 +38,9 @@ pub struct SimplifyParams {
     pub max_extent_frames: u32,
     /// How strictly the topology of labels is kept.
     pub topology: Topology,
+    /// What a change costs where topology has its price ([`Topology::Priced`]): the squared jump of colour between the labels
+    /// that it is about, over so many cubic pixels. Flat between 0.1 and 1 (docs/benchmarks.md).
+    pub topology_price: f32,
     /// Vertices that a block has which is simplified by itself; at least 1. By default its data fill a core's share of
     /// the caches.
     pub block_vertices: usize,
@@ -53,11 +57,12 @@ impl Default for SimplifyParams {
     fn default() -> Self {
         Self {
             spread_weight: 0.3,
-            surface_weight: 0.3,
+            surface_weight: 1.0,
             min_volume6: 1.0 / 16.0,
             min_shape: 0.03,
             max_extent_frames: 10,
             topology: Topology::Free,
+            topology_price: 0.5,
             block_vertices: 20_000,
         }
     }

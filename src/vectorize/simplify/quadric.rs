@@ -3,7 +3,7 @@
 //! All quadrics are stored about their own vertex (x = 0 there, in pixels and frames), which keeps single precision
 //! accurate; merging moves the origin with [`WedgeQuadric::recentered`].
 
-use glam::{Mat3, Vec3};
+use glam::{DMat3, Mat3, Vec3};
 
 /// A quadric in position alone: x' A x + 2 b . x + c.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -233,11 +233,14 @@ impl WedgeQuadric for ColorQuadric {
     }
 }
 
+/// What nothing is inverted with: its cube, a determinant, is not 0 yet.
+const LEAST_RIDGE: f32 = 1e-12;
+
 impl DistanceQuadric {
     fn color_block(&self) -> Mat3 {
         let c = &self.color;
         // A steep flat leaves its colour block nearly singular; this much of the trace keeps it invertible.
-        let ridge = 1e-6 * (c[0] + c[3] + c[5]) + f32::MIN_POSITIVE;
+        let ridge = 1e-6 * (c[0] + c[3] + c[5]) + LEAST_RIDGE;
         Mat3::from_cols(
             Vec3::new(c[0] + ridge, c[1], c[2]),
             Vec3::new(c[1], c[3] + ridge, c[4]),
@@ -252,12 +255,13 @@ impl WedgeQuadric for DistanceQuadric {
         // The flat is the graph of the field. With J the 3x3 Jacobian and M = I + J'J, the projection on its normal
         // space is [J'J M^-1, -M^-1 J'; -J M^-1, I - J M^-1 J'] (blocks position, colour); the flat passes through
         // (0, colour), so with N its colour block and m its mixed block the error is that of (x, c - colour).
-        let jacobian = Mat3::from_cols(field.gradient[0], field.gradient[1], field.gradient[2]);
+        // Where the flat is steep, single precision would leave nothing of M.
+        let jacobian = DMat3::from_cols_array_2d(&field.gradient.map(|g| g.as_dvec3().to_array()));
         let square = jacobian.transpose() * jacobian;
-        let inverse = (Mat3::IDENTITY + square).inverse();
-        let position = square * inverse;
-        let mixed = (inverse * jacobian.transpose()) * -1.0;
-        let color = Mat3::IDENTITY + (jacobian * inverse * jacobian.transpose()) * -1.0;
+        let inverse = (DMat3::IDENTITY + square).inverse();
+        let position = (square * inverse).as_mat3();
+        let mixed = (-(inverse * jacobian.transpose())).as_mat3();
+        let color = (DMat3::IDENTITY - jacobian * inverse * jacobian.transpose()).as_mat3();
         let upper =
             |m: Mat3| [m.x_axis.x, m.y_axis.x, m.z_axis.x, m.y_axis.y, m.z_axis.y, m.z_axis.z].map(|value| w * value);
         let offset = color * field.color;

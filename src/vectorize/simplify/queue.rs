@@ -14,7 +14,9 @@ pub(super) struct Entry {
     /// Sum of the ends' change counts when the cost was computed: the cost is current while this still holds.
     pub(super) stamp: u32,
     /// Times the collapse was refused since the ends last changed.
-    pub(super) attempts: u32,
+    pub(super) attempts: u16,
+    /// Whether a change of topology is in its cost that only a look at the surfaces around tells of.
+    pub(super) paid: bool,
 }
 
 /// Edges by cost.
@@ -71,7 +73,7 @@ mod tests {
     #[test]
     fn pops_by_cost() {
         let mut queue = BucketQueue::new();
-        let entry = |u| Entry { u, v: 0, stamp: 0, attempts: 0 };
+        let entry = |u| Entry { u, v: 0, stamp: 0, attempts: 0, paid: false };
         for (u, cost) in [(1, 4.0), (2, 0.0), (3, 1e9), (4, 0.5), (5, -1e-9)] {
             queue.push(BucketQueue::bucket(cost), entry(u));
         }

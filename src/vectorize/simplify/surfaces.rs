@@ -1,7 +1,8 @@
 //! What label surfaces cost that are moved: a quadric a vertex of a run, where labels meet at a frame.
 //!
-//! In: a run of lattice. Out: quadrics of the in-frame distance to where the border was, weighted by the jump there.
-//! Frames are all that is seen, so only vertices that lie at a frame's time count; what the lattice has between frames
+//! In: a run of lattice, or a fitted mesh ([`face_quadrics`]). Out: quadrics of the in-frame distance to where the border was,
+//! weighted by the jump there.
+//! Frames are all that is seen, so of a lattice only vertices that lie at a frame's time count; what it has between frames
 //! is a staircase wherever something moves. Forbidden here: collapsing.
 //!
 //! At such a vertex the border's normal within the frame comes from the border's points around it, and its speed along
@@ -10,10 +11,10 @@
 
 use std::collections::HashMap;
 
-use glam::{IVec3, Vec2};
+use glam::{IVec3, Vec2, Vec3};
 
 use super::quadric::PositionQuadric;
-use crate::mesh::TetMesh;
+use crate::mesh::{FACES, FaceMap, TetMesh, WedgeId};
 use crate::vectorize::parallel::map;
 use crate::video::Label;
 
@@ -26,6 +27,8 @@ const SPEED_WIDTH: f32 = 1.5;
 const POINTS_PER_PIXEL: f32 = 2.0;
 /// Part of the weight where the speed is not known.
 const UNKNOWN_SPEED: f32 = 0.25;
+/// Least |n| of a face that counts: what is nearly a frame's plane is no border in it.
+const LEAST_INCLINE: f32 = 0.2;
 /// Side of a search cell, in pixels.
 const CELL: f32 = 4.0;
 
@@ -49,6 +52,39 @@ pub(super) fn surface_quadrics(run: &TetMesh, weight: f32) -> HashMap<u32, Posit
     let grid = Grid::new(&points);
     let quadrics = map((0..points.len()).collect(), |n| quadric(&points[n], &grid, weight));
     points.iter().map(|point| point.vertex).zip(quadrics).collect()
+}
+
+/// The same for a mesh whose surfaces are where they belong: each face between labels holds its corners in its plane.
+///
+/// What a displacement costs is measured as it is seen, within a frame: with |n| the length of the part of its unit normal
+/// that lies there, a face that moves by a pixel moves its border by 1 / |n|, and is seen as |n| of its area.
+pub(super) fn face_quadrics(mesh: &TetMesh, weight: f32) -> HashMap<u32, PositionQuadric> {
+    let unit = mesh.domain.unit() as f32;
+    let mut open: FaceMap<[WedgeId; 3]> = FaceMap::new();
+    let mut quadrics: HashMap<u32, PositionQuadric> = HashMap::new();
+    for tet in &mesh.tets {
+        for face in FACES {
+            let mut wedges = face.map(|corner| tet[corner]);
+            wedges.sort_unstable_by_key(|&wedge| mesh.vertex(wedge));
+            let key = wedges.map(|wedge| mesh.vertex(wedge));
+            let Some(others) = open.remove(key) else {
+                open.insert(key, wedges);
+                continue;
+            };
+            let [wedges, others] = [wedges, others].map(|side| side.map(|wedge| &mesh.wedges[wedge.index()]));
+            if wedges[0].label == others[0].label {
+                continue;
+            }
+            let [a, b, c] = key.map(|v| mesh.positions[v.index()].as_vec3() / unit);
+            let across = (b - a).cross(c - a);
+            let normal = across.normalize_or_zero();
+            let jump = (0..3).map(|corner| wedges[corner].color - others[corner].color).sum::<Vec3>() / 3.0;
+            let share = across.length() / (6.0 * normal.truncate().length().max(LEAST_INCLINE));
+            let plane = PositionQuadric::plane(normal, 0.0, weight * jump.length_squared() * share);
+            key.into_iter().for_each(|v| quadrics.entry(v.0).or_default().add_scaled(&plane, 1.0));
+        }
+    }
+    quadrics
 }
 
 fn border_points(run: &TetMesh) -> Vec<BorderPoint> {
@@ -174,8 +210,6 @@ fn speed(point: &BorderPoint, normal: Vec2, grid: &Grid<'_>) -> Option<f32> {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
-
     use super::*;
     use crate::mesh::{Domain, Wedge};
 
@@ -201,5 +235,25 @@ mod tests {
         assert!(quadric.at(later) < 0.05 * jump, "{}", quadric.at(later) / jump);
         let off = Vec3::new(1.0, 0.0, 0.0);
         assert!((quadric.at(off) / jump - 0.8).abs() < 0.1, "{}", quadric.at(off) / jump);
+    }
+
+    /// Two tets on either side of a face that leans in time, as a border that moves by a pixel a frame.
+    #[test]
+    fn a_face_costs_what_the_moved_border_shows() {
+        let mut mesh = TetMesh::empty(Domain { width: 40, height: 40, duration: 8, subpixel_bits: 3 });
+        let corners = [[10, 0, 0], [10, 12, 0], [16, 0, 6], [4, 3, 3], [19, 3, 3]];
+        let vertices = corners.map(|corner| mesh.push_vertex(IVec3::from_array(corner) * 8));
+        for (label, level, far) in [(Label(0), 0.0, 3), (Label(1), 100.0, 4)] {
+            let color = Vec3::splat(level);
+            let tet = [0, 1, 2, far].map(|n| mesh.push_wedge(Wedge { vertex: vertices[n], label, color }));
+            mesh.tets.push(tet);
+        }
+        let quadrics = face_quadrics(&mesh, 1.0);
+        assert_eq!(quadrics.len(), 3);
+        let total = |offset: Vec3| quadrics.values().map(|quadric| quadric.at(offset)).sum::<f32>();
+        // 36 pixels of border times frames: half of 12 by 6.
+        let jump = 3.0 * 100.0f32.powi(2) * 36.0;
+        assert!((total(Vec3::X) / jump - 1.0).abs() < 1e-3, "{}", total(Vec3::X) / jump);
+        assert!(total(Vec3::new(1.0, 5.0, 1.0)) < 1e-3 * jump, "along the face, nothing");
     }
 }

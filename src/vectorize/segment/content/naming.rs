@@ -29,6 +29,8 @@ pub(super) struct Before<'a> {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Palette {
     colors: Vec<Vec3>,
+    /// Whether they were thin when they were new.
+    thin: Vec<bool>,
 }
 
 impl Palette {
@@ -42,6 +44,7 @@ impl Palette {
         before: Option<Before<'_>>,
     ) -> Vec<u32> {
         let votes = before.map_or_else(BTreeMap::new, |before| before.votes(raster, frame, pixels));
+        let thin = thin_regions(raster, pixels, &regions.areas);
         let mut order: Vec<u32> = (0..regions.areas.len() as u32).collect();
         order.sort_by_key(|&region| std::cmp::Reverse(regions.areas[region as usize]));
         let mut names = vec![NONE; order.len()];
@@ -49,13 +52,15 @@ impl Palette {
             let taken: BTreeSet<u32> =
                 regions.beside[region as usize].iter().map(|&other| names[other as usize]).collect();
             let color = regions.colors[region as usize];
+            let is_thin = thin[region as usize];
             let mut voted: Vec<(u32, u32)> =
                 votes.range((region, 0)..=(region, NONE)).map(|(&(_, label), &n)| (n, label)).collect();
             voted.sort_unstable_by_key(|&(n, label)| (std::cmp::Reverse(n), label));
             let least = regions.areas[region as usize] / LEAST_SHARE;
             let kept = voted.iter().filter(|(n, _)| *n >= least).map(|&(_, label)| label).find(|l| !taken.contains(l));
-            let name = kept.or_else(|| self.nearest(color, &taken)).unwrap_or_else(|| {
+            let name = kept.or_else(|| self.nearest(color, is_thin, &taken)).unwrap_or_else(|| {
                 self.colors.push(color);
+                self.thin.push(is_thin);
                 self.colors.len() as u32 - 1
             });
             self.colors[name as usize] = self.colors[name as usize].lerp(color, DRIFT);
@@ -65,15 +70,32 @@ impl Palette {
     }
 
     /// The label that looks most like a colour, if one looks alike; parts of a picture that are not beside each other can
-    /// share one.
-    fn nearest(&self, color: Vec3, taken: &BTreeSet<u32>) -> Option<u32> {
-        let free = (0..).zip(&self.colors).filter(|(label, _)| !taken.contains(label));
+    /// share one. Thin ones do not share with others: no pixel has their colour, but a blend with what is beside them.
+    fn nearest(&self, color: Vec3, is_thin: bool, taken: &BTreeSet<u32>) -> Option<u32> {
+        let free = (0..)
+            .zip(&self.colors)
+            .filter(|(label, _)| !taken.contains(label) && self.thin[*label as usize] == is_thin);
         let near = free.map(|(label, own)| (own.distance_squared(color), label));
         let best = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
         (best.0 < SAME_COLOR).then_some(best.1)
     }
 }
 
+/// Which regions have next to no pixel with all neighbours in it.
+fn thin_regions(raster: Raster, pixels: &[Pixel], areas: &[u32]) -> Vec<bool> {
+    let mut inside = vec![0u32; areas.len()];
+    for (p, pixel) in pixels.iter().enumerate() {
+        let (x, y) = raster.xy(p);
+        let is_same = |&(dx, dy): &(i64, i64)| {
+            raster.index(x as i64 + dx, y as i64 + dy).is_none_or(|q| pixels[q].region == pixel.region)
+        };
+        inside[pixel.region as usize] += u32::from([(-1, 0), (1, 0), (0, -1), (0, 1)].iter().all(is_same));
+    }
+    inside.iter().zip(areas).map(|(inside, area)| inside * THIN < *area).collect()
+}
+
+/// A thin region has less than one pixel in so many inside.
+const THIN: u32 = 20;
 /// No label.
 const NONE: u32 = u32::MAX;
 /// A label that at least one in so many of a region's pixels had before can go on.
