@@ -24,7 +24,7 @@ fn run(clip: &Clip, lattice: &TetMesh) -> (SimplifyReport, SimplifyReport) {
     let keep = 2.0 * goal.vertices as f64 / lattice.positions.len() as f64;
     let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
     let blocks = BlockGoal { keep, max_error: f32::INFINITY, shift: 0.0 };
-    (work.append_simplified(lattice, blocks, &params), simplify(&mut work, ALL, goal, &params))
+    (work.append_simplified(lattice, 1, blocks, &params), simplify(&mut work, ALL, goal, &params))
 }
 
 fn bench(bencher: Bencher<'_, '_>, clip: &Clip, lattice: &TetMesh) {

@@ -240,7 +240,7 @@ fn blocks_join_into_one_tiling() {
         let mut collapses = 0;
         for (first, last) in [(0, 4), (4, 7), (7, 10)] {
             let run = clip.run(first, last);
-            let report = work.append_simplified(&run, goal, &params);
+            let report = work.append_simplified(&run, 1, goal, &params);
             assert!(report.collapses > run.positions.len() as u64 / 8, "{report:?}");
             collapses += report.collapses;
         }

@@ -6,7 +6,11 @@ use super::{EncodeError, EncoderConfig, LatticeKind};
 use crate::mesh::{Domain, TetMesh};
 use crate::vectorize::cleave::{cleave, cleave_tets};
 use crate::vectorize::lattice::{AdaptiveLattice, Lattice, TetLattice};
+use crate::vectorize::segment::{halfway, is_moving};
 use crate::video::{Frame, LabelPlane};
+
+/// A frame and its labels.
+type Plane = (Arc<Frame>, LabelPlane);
 
 /// A run of mesh that continues the last one at its lowest plane.
 pub(super) struct Run {
@@ -14,6 +18,14 @@ pub(super) struct Run {
     pub(super) mesh: TetMesh,
     /// Frame number of its highest plane.
     pub(super) last: u32,
+    /// Planes that its lattice has for each frame, between which is nothing but lattice.
+    pub(super) planes_a_frame: i32,
+}
+
+/// What is known of a run whose lattice is held back.
+struct Held {
+    last: u32,
+    planes_a_frame: i32,
 }
 
 /// Collects planes and makes runs of them.
@@ -26,11 +38,11 @@ pub(super) struct Runs {
     /// Whether labels may differ.
     is_cut: bool,
     /// Planes that are not in a lattice yet, and before them the one that the next run starts with.
-    waiting: Vec<(Arc<Frame>, LabelPlane)>,
+    waiting: Vec<Plane>,
     /// Number of the first plane waiting.
     first: u32,
-    /// Highest plane of the run that is to come out next, where the adaptive lattice holds one back.
-    held: Option<u32>,
+    /// The run that is to come out next, where the adaptive lattice holds one back.
+    held: Option<Held>,
 }
 
 impl Runs {
@@ -92,27 +104,59 @@ impl Runs {
         let next = self.waiting.split_off(steps as usize);
         let mut planes = std::mem::replace(&mut self.waiting, next);
         planes.push(self.waiting[0].clone());
-        let (frames, labels): (Vec<Arc<Frame>>, Vec<LabelPlane>) = planes.into_iter().unzip();
         let first = self.first;
         self.first += steps;
         match &mut self.adaptive {
             Some(adaptive) => {
-                let lattice = adaptive.push(first, &frames, &labels)?;
-                self.cleave_held(lattice, Some(first + steps))
+                let (times, planes) = with_halves(planes, first, self.domain.unit());
+                let planes_a_frame = if times.len() > 2 * steps as usize { 2 } else { 1 };
+                let (frames, labels): (Vec<Arc<Frame>>, Vec<LabelPlane>) = planes.into_iter().unzip();
+                let lattice = adaptive.push_planes(&times, &frames, &labels)?;
+                self.cleave_held(lattice, Some(Held { last: first + steps, planes_a_frame }))
             }
             None => {
+                let (frames, labels): (Vec<Arc<Frame>>, Vec<LabelPlane>) = planes.into_iter().unzip();
                 let mesh = cleave(&Lattice::try_new(self.domain, first, &frames, &labels)?)?;
-                Ok(Some(Run { mesh, last: first + steps }))
+                Ok(Some(Run { mesh, last: first + steps, planes_a_frame: 1 }))
             }
         }
     }
 
-    /// The run of a lattice that was held back, while one up to plane `next` is.
-    fn cleave_held(&mut self, lattice: Option<TetLattice>, next: Option<u32>) -> Result<Option<Run>, EncodeError> {
-        let last = std::mem::replace(&mut self.held, next);
-        match (lattice, last) {
-            (Some(lattice), Some(last)) => Ok(Some(Run { mesh: cleave_tets(&lattice)?, last })),
+    /// The run of a lattice that was held back, while `next` is.
+    fn cleave_held(&mut self, lattice: Option<TetLattice>, next: Option<Held>) -> Result<Option<Run>, EncodeError> {
+        let held = std::mem::replace(&mut self.held, next);
+        match (lattice, held) {
+            (Some(lattice), Some(Held { last, planes_a_frame })) => {
+                Ok(Some(Run { mesh: cleave_tets(&lattice)?, last, planes_a_frame }))
+            }
             _ => Ok(None),
         }
     }
+}
+
+/// A run's planes and their times, with planes between frames where labels move by more than a pixel a frame: as many as
+/// the lattice's cells have room for, which it would otherwise fill with what it knows.
+fn with_halves(planes: Vec<Plane>, first: u32, unit: i32) -> (Vec<i64>, Vec<Plane>) {
+    const CELL: usize = AdaptiveLattice::MAX_STEPS as usize;
+    let steps = planes.len() - 1;
+    let moves = planes.windows(2).any(|pair| is_moving(&pair[0].1, &pair[1].1));
+    let halves = match CELL.checked_sub(steps) {
+        _ if !moves => 0,
+        Some(0) => steps,
+        Some(room) if room <= steps => room,
+        _ => 0,
+    };
+    let unit = i64::from(unit);
+    let time = |n: usize| (i64::from(first) + n as i64) * unit;
+    // The last ones, as where the lattice fills cells by itself.
+    let between: Vec<(i64, Plane)> = (steps - halves..steps)
+        .map(|n| {
+            let [before, after] = [&planes[n], &planes[n + 1]];
+            let (frame, labels) = halfway((&before.0, &before.1), (&after.0, &after.1));
+            (time(n) + unit / 2, (Arc::new(frame), labels))
+        })
+        .collect();
+    let mut all: Vec<(i64, Plane)> = (0..).map(time).zip(planes).chain(between).collect();
+    all.sort_by_key(|(time, _)| *time);
+    all.into_iter().unzip()
 }

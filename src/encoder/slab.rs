@@ -203,10 +203,11 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let mut packets = Vec::new();
         let runs = observer.stage(Stage::Lattice, || self.runs.take_ready(frames.is_some()))?;
         let count = runs.len();
-        for (n, Run { mesh, last }) in runs.into_iter().enumerate() {
+        for (n, Run { mesh, last, planes_a_frame }) in runs.into_iter().enumerate() {
             let goal = self.goal_of_run(&mesh, last - self.lead);
-            let report =
-                observer.stage(Stage::Simplify, || self.work.append_simplified(&mesh, goal, &self.simplify_params));
+            let report = observer.stage(Stage::Simplify, || {
+                self.work.append_simplified(&mesh, planes_a_frame, goal, &self.simplify_params)
+            });
             log::debug!("blocks: {report:?}");
             observer.tell(Event::Simplified(report));
             self.lead = last;

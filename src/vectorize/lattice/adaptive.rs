@@ -90,11 +90,33 @@ impl AdaptiveLattice {
         frames: &[Arc<Frame>],
         labels: &[LabelPlane],
     ) -> Result<Option<TetLattice>, LatticeError> {
-        check(self.domain, Self::MIN_SUBPIXEL_BITS, first, frames, labels)?;
-        if frames.len() > Self::MAX_STEPS as usize + 1 {
+        let unit = i64::from(self.domain.unit());
+        let times: Vec<i64> = (i64::from(first)..).map(|frame| frame * unit).take(frames.len()).collect();
+        self.push_planes(&times, frames, labels)
+    }
+
+    /// The same with planes between frames, too: `times` are those of all planes, ascending, in lattice units. Up to
+    /// twice as many planes make a layer.
+    ///
+    /// # Errors
+    /// As [`Self::push`]; planes without a time count as missing.
+    pub fn push_planes(
+        &mut self,
+        times: &[i64],
+        frames: &[Arc<Frame>],
+        labels: &[LabelPlane],
+    ) -> Result<Option<TetLattice>, LatticeError> {
+        let unit = i64::from(self.domain.unit());
+        let last = times.last().map_or(0, |&time| (time.max(0) as u64).div_ceil(unit as u64));
+        check(self.domain, Self::MIN_SUBPIXEL_BITS, last, frames, labels)?;
+        let most = if times.iter().all(|time| time % unit == 0) { Self::MAX_STEPS } else { 2 * Self::MAX_STEPS };
+        let is_ascending = times.windows(2).all(|pair| pair[0] < pair[1]);
+        if frames.len() > most as usize + 1 || times.len() != frames.len() || !is_ascending || times[0] < 0 {
             return Err(LatticeError::PlaneCount { frames: frames.len(), labels: labels.len() });
         }
-        let mut layer = self.layer(first, frames, labels);
+        // What was checked fits.
+        let times: Vec<i32> = times.iter().map(|&time| time as i32).collect();
+        let mut layer = self.layer(&times, frames, labels);
         let done = self.waiting.take().map(|mut before| {
             before.importance.join(&mut layer.importance);
             before.importance.saturate();
@@ -111,17 +133,18 @@ impl AdaptiveLattice {
         Some(layer.lattice(self.domain))
     }
 
-    fn layer(&self, first: u32, frames: &[Arc<Frame>], labels: &[LabelPlane]) -> Layer {
+    fn layer(&self, times: &[i32], frames: &[Arc<Frame>], labels: &[LabelPlane]) -> Layer {
         let unit = self.domain.unit();
         let axes = [
             Axis::of_pixels(self.domain.width, unit),
             Axis::of_pixels(self.domain.height, unit),
-            Axis::of_planes(first, frames.len(), unit),
+            Axis::of_planes(times),
         ];
         let pyramid = pyramid(&axes, frames);
         let mut importance = Importance::of_colors(&axes, &pyramid);
         importance.saturate();
-        let pixels = f64::from(self.domain.width) * f64::from(self.domain.height) * (frames.len() - 1) as f64;
+        let frames = f64::from(times[times.len() - 1] - times[0]) / f64::from(unit);
+        let pixels = f64::from(self.domain.width) * f64::from(self.domain.height) * frames;
         let threshold = importance.threshold((self.vertices_per_pixel * pixels) as usize);
         importance.normalize(threshold);
         let labels = LayerLabels::new(&axes, labels);

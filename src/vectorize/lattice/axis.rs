@@ -35,10 +35,14 @@ impl Axis {
         Self::through(&places, centre)
     }
 
-    /// Lines over `planes` planes, of which the first is frame `first`.
-    pub(super) fn of_planes(first: u32, planes: usize, unit: i32) -> Self {
-        let places: Vec<i32> = (0..planes as i32).map(|n| (first as i32 + n) * unit).collect();
-        Self::through(&places, |place| place as f32 / unit as f32 - first as f32)
+    /// Lines over planes at these times, ascending, in lattice units.
+    pub(super) fn of_planes(times: &[i32]) -> Self {
+        let sample = |place: i32| {
+            let after = times.partition_point(|&time| time < place).max(1);
+            let [low, high] = [times[after - 1], times[after]];
+            (after - 1) as f32 + (place - low) as f32 / (high - low) as f32
+        };
+        Self::through(times, sample)
     }
 
     /// Lines through all of `places`; `sample` gives the fractional sample at a coordinate.
@@ -94,6 +98,10 @@ fn divide(step: i32, n: i32, parts: i32) -> i32 {
 mod tests {
     use super::*;
 
+    fn frames(first: i32, count: usize) -> Vec<i32> {
+        (first..).map(|frame| 8 * frame).take(count).collect()
+    }
+
     /// In lattice units.
     fn shortest_step(axis: &Axis) -> i32 {
         axis.lines().windows(2).map(|pair| pair[1].place - pair[0].place).min().unwrap_or(0)
@@ -102,7 +110,7 @@ mod tests {
     #[test]
     fn lines_ascend_and_fill_cells_at_any_size() {
         for side in (1..60).chain([640, 641, 1001, 1920]) {
-            for axis in [Axis::of_pixels(side, 8), Axis::of_planes(7, side as usize + 1, 8)] {
+            for axis in [Axis::of_pixels(side, 8), Axis::of_planes(&frames(7, side as usize + 1))] {
                 assert_eq!(axis.steps() % CELL, 0);
                 assert!(shortest_step(&axis) > 0, "{side}");
                 let last = axis.lines()[axis.steps()];
@@ -117,10 +125,20 @@ mod tests {
 
     #[test]
     fn a_line_between_samples_reads_both() {
-        let axis = Axis::of_planes(3, 6, 8);
+        let axis = Axis::of_planes(&frames(3, 6));
         let places: Vec<i32> = axis.lines().iter().map(|line| line.place).collect();
         assert_eq!(places, [24, 32, 40, 44, 48, 52, 56, 60, 64]);
         assert_eq!(axis.lines()[3], Line { place: 44, low: 2, high: 3, share: 0.5 });
         assert_eq!(axis.lines()[4], Line { place: 48, low: 3, high: 3, share: 0.0 });
+    }
+
+    #[test]
+    fn planes_between_frames_are_samples_too() {
+        let mut times = frames(1, 6);
+        times.extend([44, 36, 28]);
+        times.sort_unstable();
+        let axis = Axis::of_planes(&times);
+        let read: Vec<(i32, usize, usize)> = axis.lines().iter().map(|l| (l.place, l.low, l.high)).collect();
+        assert_eq!(read, (0..9).map(|n| (times[n], n, n)).collect::<Vec<_>>());
     }
 }

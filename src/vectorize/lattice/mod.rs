@@ -94,7 +94,8 @@ impl<'a> Lattice<'a> {
         frames: &'a [Arc<Frame>],
         labels: &'a [LabelPlane],
     ) -> Result<Self, LatticeError> {
-        check(domain, MIN_SUBPIXEL_BITS, first, frames, labels)?;
+        let last = u64::from(first) + frames.len().saturating_sub(1) as u64;
+        check(domain, MIN_SUBPIXEL_BITS, last, frames, labels)?;
         Ok(Self { domain, first, frames, labels })
     }
 
@@ -146,11 +147,11 @@ impl<'a> Lattice<'a> {
     }
 }
 
-/// Checks that planes fit each other and the slab.
+/// Checks that planes, the last of them at frame `last`, fit each other and the slab.
 fn check(
     domain: Domain,
     least_bits: u8,
-    first: u32,
+    last: u64,
     frames: &[Arc<Frame>],
     labels: &[LabelPlane],
 ) -> Result<(), LatticeError> {
@@ -169,8 +170,7 @@ fn check(
         }
     }
     let expected = u64::from(domain.duration).min((i32::MAX >> domain.subpixel_bits) as u64);
-    let found = u64::from(first) + frames.len() as u64 - 1;
-    if found > expected { Err(LatticeError::LastPlane { expected, found }) } else { Ok(()) }
+    if last > expected { Err(LatticeError::LastPlane { expected, found: last }) } else { Ok(()) }
 }
 
 /// Coordinate of lattice line `index` of `count` over `side` pixels: the sample's centre, the outermost at the sides.

@@ -7,6 +7,7 @@
 //! Where labels are chosen by content (`content`, another), a discontinuity costs vertices, so there is one only where
 //! the picture jumps. `cut` finds scene cuts, `motion` where things went between two frames.
 
+mod between;
 mod connect;
 mod content;
 mod cut;
@@ -20,6 +21,7 @@ mod temporal;
 #[cfg(test)]
 mod tests;
 
+pub use between::{halfway, is_moving};
 use content::Content;
 use cut::SceneView;
 pub use metrics::{explained_variation, mean_duration};

@@ -39,9 +39,15 @@ impl BlockGoal {
 }
 
 impl<Q: WedgeQuadric> WorkMesh<Q> {
-    /// Appends a run as [`WorkMesh::append`] does, after simplifying its blocks.
-    pub fn append_simplified(&mut self, run: &TetMesh, goal: BlockGoal, params: &SimplifyParams) -> SimplifyReport {
-        self.append_blocks(run, surface_quadrics(run, params.surface_weight), goal, params)
+    /// Appends a run as [`WorkMesh::append`] does, after simplifying its blocks. Its lattice has 1 or 2 planes a frame.
+    pub fn append_simplified(
+        &mut self,
+        run: &TetMesh,
+        planes_a_frame: i32,
+        goal: BlockGoal,
+        params: &SimplifyParams,
+    ) -> SimplifyReport {
+        self.append_blocks(run, surface_quadrics(run, planes_a_frame, params.surface_weight), goal, params)
     }
 
     /// The same with a fitted mesh, whose surfaces are where they belong.

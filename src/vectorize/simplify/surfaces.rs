@@ -2,11 +2,11 @@
 //!
 //! In: a run of lattice, or a fitted mesh ([`face_quadrics`]). Out: quadrics of the in-frame distance to where the border was,
 //! weighted by the jump there.
-//! Frames are all that is seen, so of a lattice only vertices that lie at a frame's time count; what it has between frames
-//! is a staircase wherever something moves. Forbidden here: collapsing.
+//! Frames are all that is seen, and what labels were carried to halfway between them is as good; so of a lattice only
+//! vertices at its planes count. What it has elsewhere is a staircase wherever something moves. Forbidden here: collapsing.
 //!
 //! At such a vertex the border's normal within the frame comes from the border's points around it, and its speed along
-//! the normal from the points in the frames before and after. The error that a surface makes there is
+//! the normal from the points half a frame or a frame before and after. The error that a surface makes there is
 //! (n . (x - p) - u (t - k))^2 for a border that moves by u a frame.
 
 use std::collections::HashMap;
@@ -20,7 +20,7 @@ use crate::video::Label;
 
 /// Radius around a vertex whose points make the normal, in pixels.
 const NORMAL_RADIUS: f32 = 2.5;
-/// How far along its normal a border is looked for one frame later or earlier, and how far beside it.
+/// How far along its normal a border is looked for later or earlier, and how far beside it.
 const SPEED_REACH: f32 = 3.5;
 const SPEED_WIDTH: f32 = 1.5;
 /// Border points a pixel of border: a lattice with diagonals has about two.
@@ -32,12 +32,13 @@ const LEAST_INCLINE: f32 = 0.2;
 /// Side of a search cell, in pixels.
 const CELL: f32 = 4.0;
 
-/// A vertex at a frame's time where labels meet.
+/// A vertex at a frame's time, or halfway between two, where labels meet.
 #[derive(Debug, Clone, Copy)]
 struct BorderPoint {
     vertex: u32,
     place: Vec2,
-    frame: i32,
+    /// Its time in halves of a frame.
+    halves: i32,
     /// Its two labels; for more, the first two.
     labels: [Label; 2],
     /// Squared difference of colour between them.
@@ -46,9 +47,9 @@ struct BorderPoint {
     is_junction: bool,
 }
 
-/// The quadrics of the vertices of `run` where labels meet at a frame, each about the vertex itself, in pixels and frames.
-pub(super) fn surface_quadrics(run: &TetMesh, weight: f32) -> HashMap<u32, PositionQuadric> {
-    let points = border_points(run);
+/// The quadrics of the vertices of `run` where labels meet at one of its planes, each about the vertex itself, in pixels and frames.
+pub(super) fn surface_quadrics(run: &TetMesh, planes_a_frame: i32, weight: f32) -> HashMap<u32, PositionQuadric> {
+    let points = border_points(run, planes_a_frame);
     let grid = Grid::new(&points);
     let quadrics = map((0..points.len()).collect(), |n| quadric(&points[n], &grid, weight));
     points.iter().map(|point| point.vertex).zip(quadrics).collect()
@@ -87,8 +88,9 @@ pub(super) fn face_quadrics(mesh: &TetMesh, weight: f32) -> HashMap<u32, Positio
     quadrics
 }
 
-fn border_points(run: &TetMesh) -> Vec<BorderPoint> {
+fn border_points(run: &TetMesh, planes_a_frame: i32) -> Vec<BorderPoint> {
     let unit = run.domain.unit();
+    let (half, step) = ((unit / 2).max(1), (unit / planes_a_frame).max(1));
     let mut first: Vec<Option<u32>> = vec![None; run.positions.len()];
     let mut points: Vec<BorderPoint> = Vec::new();
     let mut number = HashMap::new();
@@ -100,7 +102,7 @@ fn border_points(run: &TetMesh) -> Vec<BorderPoint> {
         };
         let position = run.positions[vertex];
         let other = &run.wedges[other as usize];
-        if position.z % unit != 0 || other.label == whole.label {
+        if position.z % step != 0 || other.label == whole.label {
             continue;
         }
         let jump = whole.color.distance_squared(other.color);
@@ -108,7 +110,7 @@ fn border_points(run: &TetMesh) -> Vec<BorderPoint> {
             points.push(BorderPoint {
                 vertex: vertex as u32,
                 place: position.as_vec3().truncate() / unit as f32,
-                frame: position.z / unit,
+                halves: position.z / half,
                 labels: [whole.label.min(other.label), whole.label.max(other.label)],
                 jump: 0.0,
                 is_junction: false,
@@ -132,7 +134,7 @@ impl<'a> Grid<'a> {
     fn new(points: &'a [BorderPoint]) -> Self {
         let mut cells: HashMap<IVec3, Vec<u32>> = HashMap::new();
         for (n, point) in (0..).zip(points) {
-            cells.entry(cell(point.place, point.frame)).or_default().push(n);
+            cells.entry(cell(point.place, point.halves)).or_default().push(n);
         }
         Self { points, cells }
     }
@@ -140,7 +142,7 @@ impl<'a> Grid<'a> {
     /// Calls `found(offset)` for the points between the same labels around `point`, `later` frames later, within a cell
     /// either way.
     fn visit(&self, point: &BorderPoint, later: i32, mut found: impl FnMut(Vec2)) {
-        let centre = cell(point.place, point.frame + later);
+        let centre = cell(point.place, point.halves + later);
         for dy in -1..=1 {
             for dx in -1..=1 {
                 for &n in self.cells.get(&(centre + IVec3::new(dx, dy, 0))).into_iter().flatten() {
@@ -154,9 +156,9 @@ impl<'a> Grid<'a> {
     }
 }
 
-fn cell(place: Vec2, frame: i32) -> IVec3 {
+fn cell(place: Vec2, halves: i32) -> IVec3 {
     let cell = (place / CELL).floor().as_ivec2();
-    IVec3::new(cell.x, cell.y, frame)
+    IVec3::new(cell.x, cell.y, halves)
 }
 
 fn quadric(point: &BorderPoint, grid: &Grid<'_>, weight: f32) -> PositionQuadric {
@@ -193,19 +195,22 @@ fn normal(point: &BorderPoint, grid: &Grid<'_>) -> Option<Vec2> {
     is_line.then(|| Vec2::from_angle(angle).perp())
 }
 
-/// How far the border moves along its normal in a frame, if it is found before or after.
+/// How far the border moves along its normal in a frame, if it is found before or after: half a frame away, or else a
+/// whole one.
 fn speed(point: &BorderPoint, normal: Vec2, grid: &Grid<'_>) -> Option<f32> {
-    let (mut total, mut sum) = (0.0, 0.0);
-    for later in [-1, 1] {
-        grid.visit(point, later, |offset| {
-            let (across, along) = (offset.dot(normal), offset.perp_dot(normal));
-            if across.abs() <= SPEED_REACH && along.abs() <= SPEED_WIDTH {
-                total += 1.0;
-                sum += across * later as f32;
-            }
-        });
-    }
-    (total > 0.0).then(|| sum / total)
+    [1, 2].into_iter().find_map(|halves| {
+        let (mut total, mut sum) = (0.0, 0.0);
+        for later in [-halves, halves] {
+            grid.visit(point, later, |offset| {
+                let (across, along) = (offset.dot(normal), offset.perp_dot(normal));
+                if across.abs() <= SPEED_REACH && along.abs() <= SPEED_WIDTH {
+                    total += 1.0;
+                    sum += across * 2.0 / later as f32;
+                }
+            });
+        }
+        (total > 0.0).then(|| sum / total)
+    })
 }
 
 #[cfg(test)]
@@ -227,7 +232,7 @@ mod tests {
                 }
             }
         }
-        let quadric = surface_quadrics(&run, 1.0)[&60];
+        let quadric = surface_quadrics(&run, 1, 1.0)[&60];
         let jump = 3.0 * 100.0f32.powi(2) / POINTS_PER_PIXEL;
         let along = Vec3::new(0.5, 1.0, 0.0) * 2.0;
         assert!(quadric.at(along) < 0.02 * jump, "{}", quadric.at(along) / jump);

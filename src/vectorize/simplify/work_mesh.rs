@@ -111,7 +111,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
             self.add_tet(run, tet, run.tet_vertices(tet).map(|v| vertices[v.index()]));
         }
         self.spread(first_vertex, params.spread_weight);
-        let surfaces = surface_quadrics(run, params.surface_weight);
+        let surfaces = surface_quadrics(run, 1, params.surface_weight);
         (0..).zip(vertices).for_each(|(own, vertex)| self.add_surface(vertex, surfaces.get(&own)));
     }
 
