@@ -272,26 +272,24 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
 
     fn try_collapse(&mut self, bucket: usize, entry: Entry, proposal: Proposal) {
         let (u, v) = (entry.u, entry.v);
-        if self.params.topology != Topology::Free
-            && !entry.paid
-            && !proposal.is_priced
-            && let Err(refusal) = self.mesh.check_link(u, v, &mut self.marks)
-        {
-            self.report.refusals.note(refusal);
-            if self.params.topology == Topology::Strict {
-                return self.put_back(bucket, entry);
+        let proposal = match self.mesh.check_geometry([u, v], proposal.position, &self.limits) {
+            Ok(()) => Some(proposal),
+            Err(refusal) => {
+                self.report.refusals.note(refusal);
+                self.other_place(u, v, bucket + SETBACK)
             }
-            let due = BucketQueue::bucket(proposal.cost + self.proposer().topology_price(u, v));
-            return self.queue.push(due.max(bucket), Entry { paid: true, ..entry });
-        }
-        match self.mesh.check_geometry([u, v], proposal.position, &self.limits) {
+        };
+        let Some(proposal) = proposal else { return self.put_back(bucket, entry) };
+        let is_free = self.params.topology == Topology::Free || entry.paid || proposal.is_priced;
+        match if is_free { Ok(()) } else { self.mesh.check_link(u, v, &mut self.marks) } {
             Ok(()) => self.perform(u, v, proposal),
             Err(refusal) => {
                 self.report.refusals.note(refusal);
-                match self.other_place(u, v, bucket + SETBACK) {
-                    Some(other) => self.perform(u, v, other),
-                    None => self.put_back(bucket, entry),
+                if self.params.topology == Topology::Strict {
+                    return self.put_back(bucket, entry);
                 }
+                let due = BucketQueue::bucket(proposal.cost + self.proposer().topology_price(u, v));
+                self.queue.push(due.max(bucket), Entry { paid: true, ..entry });
             }
         }
     }

@@ -195,35 +195,55 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         let [mut at_u, mut at_v] = std::mem::take(&mut marks.faces);
         self.surface_faces(u, &mut at_u);
         self.surface_faces(v, &mut at_v);
-        at_v.iter().for_each(|(face, _)| face.iter().for_each(|&w| marks.set(w, near)));
-        let common = at_v.iter().filter(|(face, _)| face.contains(&u));
-        common.for_each(|(face, _)| face.iter().for_each(|&w| marks.set(w, shared)));
-        let is_apart = |&w: &u32| w != v && marks.has(w, near);
-        let is_opposite = |face: &[u32; 2]| at_v.binary_search_by_key(face, |(other, _)| *other).is_ok();
-        let is_linked = !at_u.iter().any(|(face, _)| face.iter().any(is_apart) || is_opposite(face));
+        at_v.iter().for_each(|face| face.ends().into_iter().for_each(|w| marks.set(w, near)));
+        let common = at_v.iter().filter(|face| face.ends().contains(&u));
+        common.for_each(|face| face.ends().into_iter().for_each(|w| marks.set(w, shared)));
+        let is_apart = |w: u32| w != v && marks.has(w, near);
+        let is_opposite = |face: &SurfaceFace| at_v.binary_search_by_key(&face.key, |other| other.key).is_ok();
+        let is_linked = !at_u.iter().any(|face| face.ends().into_iter().any(is_apart) || is_opposite(face));
         marks.faces = [at_u, at_v];
         if is_linked { Ok(()) } else { Err(Refusal::Link) }
     }
 
-    /// The faces between labels at `v`, ascending: their other two corners, and one of the labels.
-    fn surface_faces(&self, v: u32, faces: &mut Vec<([u32; 2], Label)>) {
+    /// The faces between labels at `v`, ascending.
+    fn surface_faces(&self, v: u32, faces: &mut Vec<SurfaceFace>) {
         faces.clear();
         for &tet in self.stars.star(v) {
             let (corners, label) = (self.tets[tet as usize], self.labels[tet as usize]);
             let at = corners.iter().position(|&w| w == v).unwrap_or(0);
             let [a, b, c] = FACES[at].map(|corner| corners[corner]);
-            faces.extend([[a, b], [b, c], [c, a]].map(|[a, b]| ([a.min(b), a.max(b)], label)));
+            faces.extend([SurfaceFace::new(a, b, label), SurfaceFace::new(b, c, label), SurfaceFace::new(c, a, label)]);
         }
-        faces.sort_unstable_by_key(|(face, _)| *face);
+        faces.sort_unstable_by_key(|face| face.key);
         let mut kept = 0;
         for n in 1..faces.len() {
-            let [(face, label), other] = [faces[n - 1], faces[n]];
-            if face == other.0 && label != other.1 {
+            let [face, other] = [faces[n - 1], faces[n]];
+            if face.key == other.key && face.label != other.label {
                 faces[kept] = other;
                 kept += 1;
             }
         }
         faces.truncate(kept);
+    }
+}
+
+/// A face at a vertex.
+#[derive(Debug, Clone, Copy)]
+struct SurfaceFace {
+    /// Its other two corners in one number: they are sorted again and again.
+    key: u64,
+    label: Label,
+}
+
+impl SurfaceFace {
+    #[inline]
+    fn new(a: u32, b: u32, label: Label) -> Self {
+        Self { key: u64::from(a.max(b)) << 32 | u64::from(a.min(b)), label }
+    }
+
+    #[inline]
+    fn ends(&self) -> [u32; 2] {
+        [self.key as u32, (self.key >> 32) as u32]
     }
 }
 
@@ -233,7 +253,7 @@ pub(super) struct Marks {
     of: Vec<u32>,
     last: u32,
     /// Memory for the faces around both ends of an edge.
-    faces: [Vec<([u32; 2], Label)>; 2],
+    faces: [Vec<SurfaceFace>; 2],
 }
 
 impl Marks {
