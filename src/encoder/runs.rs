@@ -108,7 +108,7 @@ impl Runs {
         self.first += steps;
         match &mut self.adaptive {
             Some(adaptive) => {
-                let (times, planes) = with_halves(planes, first, self.domain.unit());
+                let (times, planes) = with_halves(planes, first, self.domain.unit(), self.is_cut);
                 let planes_a_frame = if times.len() > 2 * steps as usize { 2 } else { 1 };
                 let (frames, labels): (Vec<Arc<Frame>>, Vec<LabelPlane>) = planes.into_iter().unzip();
                 let lattice = adaptive.push_planes(&times, &frames, &labels)?;
@@ -136,16 +136,12 @@ impl Runs {
 
 /// A run's planes and their times, with planes between frames where labels move by more than a pixel a frame: as many as
 /// the lattice's cells have room for, which it would otherwise fill with what it knows.
-fn with_halves(planes: Vec<Plane>, first: u32, unit: i32) -> (Vec<i64>, Vec<Plane>) {
+fn with_halves(planes: Vec<Plane>, first: u32, unit: i32, is_cut: bool) -> (Vec<i64>, Vec<Plane>) {
     const CELL: usize = AdaptiveLattice::MAX_STEPS as usize;
     let steps = planes.len() - 1;
-    let moves = planes.windows(2).any(|pair| is_moving(&pair[0].1, &pair[1].1));
-    let halves = match CELL.checked_sub(steps) {
-        _ if !moves => 0,
-        Some(0) => steps,
-        Some(room) if room <= steps => room,
-        _ => 0,
-    };
+    let room = if steps == CELL { steps } else { CELL.saturating_sub(steps) };
+    let is_worth_it = is_cut && room <= steps && planes.windows(2).any(|pair| is_moving(&pair[0].1, &pair[1].1));
+    let halves = if is_worth_it { room } else { 0 };
     let unit = i64::from(unit);
     let time = |n: usize| (i64::from(first) + n as i64) * unit;
     // The last ones, as where the lattice fills cells by itself.

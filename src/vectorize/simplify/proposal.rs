@@ -43,6 +43,14 @@ struct Merged {
 }
 
 impl Merged {
+    /// A position, moved to where the vertex is bound.
+    fn bind(&self, mut position: IVec3) -> IVec3 {
+        for axis in (0..3).filter(|&axis| self.fixed[axis].is_some()) {
+            position[axis] = self.origin[axis];
+        }
+        position
+    }
+
     fn at(&self, position: IVec3, offset: Vec3) -> Proposal {
         // What rounding makes of nothing may be less than nothing.
         let cost = self.quadric.at(offset).max(0.0) + self.price;
@@ -69,10 +77,8 @@ impl<Q: WedgeQuadric> Proposer<'_, Q> {
     pub(super) fn other_places(&self, u: u32, v: u32) -> Option<[Proposal; 3]> {
         let merged = self.merged(u, v).ok().filter(|merged| !merged.stays)?;
         let [a, b] = [u, v].map(|w| self.mesh.vertices[w as usize].position);
-        let mut places = [a, b, (a + b) / 2].map(|mut place| {
-            for axis in (0..3).filter(|&axis| merged.fixed[axis].is_some()) {
-                place[axis] = merged.origin[axis];
-            }
+        let mut places = [a, b, (a + b) / 2].map(|place| {
+            let place = merged.bind(place);
             merged.at(place, self.mesh.offset(merged.origin, place))
         });
         places.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -165,23 +171,16 @@ impl<Q: WedgeQuadric> Proposer<'_, Q> {
     fn best_position(&self, merged: &Merged, ends: [u32; 2]) -> Proposal {
         let mesh = self.mesh;
         let unit = mesh.domain.unit() as f32;
-        let (origin, fixed) = (merged.origin, merged.fixed);
+        let origin = merged.origin;
         let [a, b] = ends.map(|v| mesh.vertices[v as usize].position);
         let at = |position: IVec3| merged.at(position, mesh.offset(origin, position));
         let middle = mesh.offset(origin, a).midpoint(mesh.offset(origin, b));
         let reach = 2.0 * mesh.offset(a, b).length();
-        if let Some(x) = merged.quadric.minimizer(fixed).filter(|x| x.distance(middle) <= reach) {
+        if let Some(x) = merged.quadric.minimizer(merged.fixed).filter(|x| x.distance(middle) <= reach) {
             return at(origin + (x * unit).round().as_ivec3());
         }
-        let mut middle = (a + b) / 2;
-        for axis in 0..3 {
-            if fixed[axis].is_some() {
-                middle[axis] = origin[axis];
-            }
-        }
-        let bound_to = |p: IVec3| (0..3).all(|axis| fixed[axis].is_none() || p[axis] == origin[axis]);
-        let mut best = at(middle);
-        for proposal in [a, b].into_iter().filter(|&p| bound_to(p)).map(at) {
+        let mut best = at(merged.bind((a + b) / 2));
+        for proposal in [a, b].into_iter().filter(|&p| merged.bind(p) == p).map(at) {
             if proposal.cost < best.cost {
                 best = proposal;
             }

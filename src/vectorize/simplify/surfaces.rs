@@ -139,8 +139,8 @@ impl<'a> Grid<'a> {
         Self { points, cells }
     }
 
-    /// Calls `found(offset)` for the points between the same labels around `point`, `later` frames later, within a cell
-    /// either way.
+    /// Calls `found(offset)` for the points between the same labels around `point`, `later` halves of a frame later, within
+    /// a cell either way.
     fn visit(&self, point: &BorderPoint, later: i32, mut found: impl FnMut(Vec2)) {
         let centre = cell(point.place, point.halves + later);
         for dy in -1..=1 {

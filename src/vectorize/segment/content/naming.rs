@@ -85,11 +85,8 @@ impl Palette {
 fn thin_regions(raster: Raster, pixels: &[Pixel], areas: &[u32]) -> Vec<bool> {
     let mut inside = vec![0u32; areas.len()];
     for (p, pixel) in pixels.iter().enumerate() {
-        let (x, y) = raster.xy(p);
-        let is_same = |&(dx, dy): &(i64, i64)| {
-            raster.index(x as i64 + dx, y as i64 + dy).is_none_or(|q| pixels[q].region == pixel.region)
-        };
-        inside[pixel.region as usize] += u32::from([(-1, 0), (1, 0), (0, -1), (0, 1)].iter().all(is_same));
+        let is_inside = raster.sides(p).all(|q| pixels[q].region == pixel.region);
+        inside[pixel.region as usize] += u32::from(is_inside);
     }
     inside.iter().zip(areas).map(|(inside, area)| inside * THIN < *area).collect()
 }
