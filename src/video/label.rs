@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use super::Frame;
+
 /// A region of the video that persists through time within a slab. Colour may jump only between labels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Label(pub u32);
@@ -12,13 +14,14 @@ pub struct LabelPlane {
     width: u32,
     height: u32,
     labels: Arc<[Label]>,
+    pure: Option<Arc<Frame>>,
 }
 
 impl LabelPlane {
     /// Wraps `labels`, row-major; panics unless there are `width * height` of them.
     pub fn new(width: u32, height: u32, labels: Vec<Label>) -> Self {
         assert_eq!(labels.len(), width as usize * height as usize, "one label a pixel");
-        Self { width, height, labels: labels.into() }
+        Self { width, height, labels: labels.into(), pure: None }
     }
 
     /// A plane of one label.
@@ -39,6 +42,20 @@ impl LabelPlane {
     /// Whether all pixels have one label.
     pub fn is_uniform(&self) -> bool {
         self.labels.iter().all(|label| *label == self.labels[0])
+    }
+
+    /// The same with the colour that each pixel's label has there where no other shows through; panics if the frame has
+    /// another size.
+    #[must_use]
+    pub fn with_pure_colors(mut self, pure: Frame) -> Self {
+        assert_eq!((pure.width(), pure.height()), (self.width, self.height), "one colour a pixel");
+        self.pure = Some(Arc::new(pure));
+        self
+    }
+
+    /// The colour that each pixel's label has there where no other shows through, if that is known.
+    pub fn pure_colors(&self) -> Option<&Arc<Frame>> {
+        self.pure.as_ref()
     }
 
     /// All labels, row-major.

@@ -4,13 +4,16 @@
 //! vectorisation live elsewhere.
 
 mod convert;
+mod edges;
 mod frame;
 mod label;
+mod pure;
 mod surface;
 mod volume;
 
 pub(crate) use convert::rgb_to_yuv;
 pub use convert::{ConvertError, PlaneRef};
+pub use edges::Edges;
 pub use frame::{Frame, FrameError, MAX_FRAME_SIDE};
 pub use label::{Label, LabelPlane};
 pub use surface::{MAX_SURFACE_SIDE, PixelFormat, Plane, Surface, SurfaceError, YuvMatrix};

@@ -126,7 +126,10 @@ impl<'a> Fitting<'a> {
     }
 
     fn surfaces(&mut self, labels: &[(u32, LabelPlane)]) {
-        if !self.patch.boundary.contains(&true) {
+        // Where the pure colours of labels are known, edges were cut at their places within pixels; planes of labels know
+        // pixels alone.
+        let is_placed = labels.iter().any(|(_, plane)| plane.pure_colors().is_some());
+        if is_placed || !self.patch.boundary.contains(&true) {
             return;
         }
         let boundary = BoundaryPoints::new(labels);

@@ -16,7 +16,7 @@ use super::samples::{Grid, LEVELS, pyramid};
 use super::{LatticeError, check};
 use crate::mesh::Domain;
 use crate::vectorize::parallel::map;
-use crate::video::{Frame, Label, LabelPlane};
+use crate::video::{Edges, Frame, Label, LabelPlane};
 
 /// Tets over vertices of a lattice, before labels split them.
 #[derive(Debug, Clone)]
@@ -62,6 +62,8 @@ struct Layer {
     pyramid: [Grid; LEVELS],
     labels: LayerLabels,
     importance: Importance,
+    /// Of each plane, where labels differ.
+    edges: Vec<Edges>,
 }
 
 impl AdaptiveLattice {
@@ -140,7 +142,13 @@ impl AdaptiveLattice {
             Axis::of_pixels(self.domain.height, unit),
             Axis::of_planes(times),
         ];
-        let pyramid = pyramid(&axes, frames);
+        let is_cut = !labels.iter().all(LabelPlane::is_uniform);
+        let planes: Vec<(&Arc<Frame>, &LabelPlane)> =
+            if is_cut { frames.iter().zip(labels).collect() } else { Vec::new() };
+        let edges: Vec<Edges> = map(planes, |(frame, labels)| Edges::new(frame, labels));
+        // What is blended at edges is for the cuts to say.
+        let pure: Vec<Arc<Frame>> = edges.iter().map(|edges| edges.pure().clone()).collect();
+        let pyramid = pyramid(&axes, if is_cut { &pure } else { frames });
         let mut importance = Importance::of_colors(&axes, &pyramid);
         importance.saturate();
         let frames = f64::from(times[times.len() - 1] - times[0]) / f64::from(unit);
@@ -152,7 +160,7 @@ impl AdaptiveLattice {
             importance.need(|vertex, step| labels.need(vertex, step));
             importance.saturate();
         }
-        Layer { axes, pyramid, labels, importance }
+        Layer { axes, pyramid, labels, importance, edges }
     }
 }
 
@@ -215,9 +223,9 @@ impl Layer {
         edges.dedup();
         let cut = |edge: [u32; 2]| {
             let crossing = labels.crossing(edge.map(|v| self.vertex(v)))?;
-            let share = (crossing.place + self.blend(&crossing)) / crossing.steps as f32;
+            let place = crossing.before as f32 + self.share(&crossing);
             let colors = crossing.samples.map(|sample| self.color(sample, 0));
-            Some(EdgeCut { edge: edge.map(|v| numbers[v as usize]), share, colors })
+            Some(EdgeCut { edge: edge.map(|v| numbers[v as usize]), share: place / crossing.steps as f32, colors })
         };
         edges.into_iter().filter_map(cut).collect()
     }
@@ -229,19 +237,21 @@ impl Layer {
         [index % columns, index / columns % lines, index / (columns * lines)]
     }
 
-    /// How far past halfway between its two samples a crossing lies, in samples: the pixels at an edge are means over their
-    /// squares, so what each has of the other label's colour tells where in it the edge is. Between frames there are no
-    /// means.
-    fn blend(&self, crossing: &Crossing) -> f32 {
-        let [before, after] = crossing.samples;
-        let [first, second] = crossing.beyond.map(|sample| self.color(sample, 0));
-        let jump = first - second;
-        if before[2] != after[2] || jump.length_squared() < LEAST_JUMP {
-            return 0.0;
+    /// How far from its first sample to the next a crossing lies: within a plane where the edge is, from one plane to
+    /// another by how far the edge is in each. Halfway at lines between pixels.
+    fn share(&self, crossing: &Crossing) -> f32 {
+        let pixel = |vertex: [usize; 3]| {
+            let [x, y, t] = std::array::from_fn(|axis| self.axes[axis].lines()[vertex[axis]].sample());
+            Some(([x? as u32, y? as u32], t?))
+        };
+        let [first, second] = crossing.samples.map(pixel);
+        let (Some((p, before)), Some((q, after))) = (first, second) else { return 0.5 };
+        let edges = [before, after].map(|plane| &self.edges[plane]);
+        if before == after {
+            return if p == q { 0.5 } else { edges[0].share(p, q) };
         }
-        let part = |color: Vec3| ((color - second).dot(jump) / jump.length_squared()).clamp(0.0, 1.0);
-        let of_first = part(self.color(before, 0)) + part(self.color(after, 0));
-        (of_first - 1.0).clamp(-MOST_BLEND, MOST_BLEND)
+        let distances = [edges[0].distance(p, crossing.labels[1]), edges[1].distance(q, crossing.labels[0])];
+        (distances[0] / (distances[0] + distances[1])).clamp(MARGIN, 1.0 - MARGIN)
     }
 
     fn color(&self, vertex: [usize; 3], level: u8) -> Vec3 {
@@ -263,10 +273,8 @@ impl Layer {
     }
 }
 
-/// Least squared difference of colours, in squared levels over the channels, that tells which of two a blend has more of.
-const LEAST_JUMP: f32 = 200.0;
-/// Furthest from halfway that blends move a crossing, in samples: half would be at a sample.
-const MOST_BLEND: f32 = 0.45;
+/// Closest to a sample that a crossing lies, of the way to the next.
+const MARGIN: f32 = 0.05;
 
 /// Level of a vertex that no leaf has.
 const ABSENT: u8 = u8::MAX;

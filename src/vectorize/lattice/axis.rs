@@ -20,6 +20,13 @@ pub(super) struct Line {
     pub(super) share: f32,
 }
 
+impl Line {
+    /// The sample that it goes through, if it goes through one.
+    pub(super) fn sample(&self) -> Option<usize> {
+        (self.low == self.high).then_some(self.low)
+    }
+}
+
 /// The lines of an axis; their number less one is a multiple of [`CELL`].
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Axis {

@@ -36,14 +36,14 @@ pub(super) struct MixedLabels {
 /// Where an edge passes from one label to the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
-    /// How far along the edge, in samples: halfway between two of them.
-    pub(super) place: f32,
+    /// Samples of the first label's part, less one: it lies between this one and the next.
+    pub(super) before: usize,
     /// Samples from end to end, less one.
     pub(super) steps: usize,
     /// The last sample of the first label and the first one of the other.
     pub(super) samples: [[usize; 3]; 2],
-    /// One sample further on either side, if it has the same label: what colour the label has where no pixel is blended.
-    pub(super) beyond: [[usize; 3]; 2],
+    /// The two labels.
+    pub(super) labels: [Label; 2],
 }
 
 impl LayerLabels {
@@ -163,20 +163,7 @@ impl MixedLabels {
         let count = (0..=steps).filter(|&n| is_first(n)).count();
         let before = (0..count).rev().find(|&n| is_first(n)).map_or(start, sample);
         let after = (count..steps).find(|&n| self.at(sample(n)) == labels[1]).map_or(end, sample);
-        let beyond = [self.beyond(before, end, start, steps), self.beyond(after, start, end, steps)];
-        Some(Crossing { place: count as f32 - 0.5, steps, samples: [before, after], beyond })
-    }
-
-    /// The sample after `sample` on the way `from` to `to`, which take `steps`, if it has the same label.
-    fn beyond(&self, sample: [usize; 3], from: [usize; 3], to: [usize; 3], steps: usize) -> [usize; 3] {
-        let next: [Option<usize>; 3] = std::array::from_fn(|axis| {
-            let step = (to[axis] as isize - from[axis] as isize) / steps as isize;
-            sample[axis].checked_add_signed(step).filter(|&n| n < self.size[axis])
-        });
-        match next {
-            [Some(x), Some(y), Some(t)] if self.at([x, y, t]) == self.at(sample) => [x, y, t],
-            _ => sample,
-        }
+        Some(Crossing { before: count - 1, steps, samples: [before, after], labels })
     }
 }
 
@@ -218,15 +205,12 @@ mod tests {
     fn edges_are_cut_between_the_samples_of_their_labels() {
         let labels = labels(9, |[x, ..]| u32::from(x > 2));
         let crossing = labels.crossing([[0, 0, 8], [8, 8, 8]]).unwrap();
-        let expected =
-            Crossing { place: 2.5, steps: 8, samples: [[2, 2, 8], [3, 3, 8]], beyond: [[1, 1, 8], [4, 4, 8]] };
+        let [first, second] = [0, 1].map(Label);
+        let expected = Crossing { before: 2, steps: 8, samples: [[2, 2, 8], [3, 3, 8]], labels: [first, second] };
         assert_eq!(crossing, expected);
         let back = labels.crossing([[3, 0, 8], [2, 0, 8]]).unwrap();
-        let expected =
-            Crossing { place: 0.5, steps: 1, samples: [[3, 0, 8], [2, 0, 8]], beyond: [[4, 0, 8], [1, 0, 8]] };
+        let expected = Crossing { before: 0, steps: 1, samples: [[3, 0, 8], [2, 0, 8]], labels: [second, first] };
         assert_eq!(back, expected);
         assert_eq!(labels.crossing([[0, 0, 0], [0, 8, 0]]), None);
-        let stroke = self::labels(9, |[x, ..]| u32::from(x == 4));
-        assert_eq!(stroke.crossing([[4, 0, 0], [5, 0, 0]]).unwrap().beyond, [[4, 0, 0], [6, 0, 0]]);
     }
 }

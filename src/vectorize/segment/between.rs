@@ -72,8 +72,8 @@ impl Matches<'_> {
         self.ends[end].1.labels()[p]
     }
 
-    fn color(&self, end: usize, p: usize) -> [u8; 3] {
-        self.ends[end].0.pixels()[p]
+    fn colors(&self, end: usize, p: usize) -> Colors {
+        colors(self.ends[end], p)
     }
 
     /// Where each label of a block goes.
@@ -157,7 +157,7 @@ struct Arrival {
     label: Label,
     /// Pixels of its label.
     area: u32,
-    color: [u8; 3],
+    colors: Colors,
 }
 
 impl Arrivals<'_> {
@@ -173,8 +173,8 @@ impl Arrivals<'_> {
                 let Some(q) = matches.moved(p, vector).filter(|&q| matches.label(1, q) == label) else { continue };
                 // Rounded down from either end, an odd way has the same middle.
                 let Some(middle) = matches.moved(p, vector.map(|component| component.div_euclid(2))) else { continue };
-                let color = mean(matches.color(0, p), matches.color(1, q));
-                self.arrive(middle, Arrival { label, area: self.areas[&label], color });
+                let colors = mean(matches.colors(0, p), matches.colors(1, q));
+                self.arrive(middle, Arrival { label, area: self.areas[&label], colors });
             }
         }
     }
@@ -189,19 +189,22 @@ impl Arrivals<'_> {
 
     fn picture(&self, ends: [Plane<'_>; 2]) -> (Frame, LabelPlane) {
         let mut frame = ends[0].0.clone();
+        let mut pure = frame.clone();
         let mut labels = Vec::with_capacity(self.at.len());
-        for (p, (arrival, pixel)) in self.at.iter().zip(frame.pixels_mut()).enumerate() {
-            let (label, color) = arrival.map_or_else(|| self.behind(ends, p), |arrival| (arrival.label, arrival.color));
-            *pixel = color;
+        for (p, arrival) in self.at.iter().enumerate() {
+            let (label, colors) =
+                arrival.map_or_else(|| self.behind(ends, p), |arrival| (arrival.label, arrival.colors));
+            [frame.pixels_mut()[p], pure.pixels_mut()[p]] = colors;
             labels.push(label);
         }
         let plane = LabelPlane::new(frame.width(), frame.height(), labels);
-        (frame, plane)
+        let is_known = ends.iter().all(|(_, plane)| plane.pure_colors().is_some());
+        (frame, if is_known { plane.with_pure_colors(pure) } else { plane })
     }
 
     /// What is seen where nothing arrives: the larger of the labels before and after.
-    fn behind(&self, ends: [Plane<'_>; 2], p: usize) -> (Label, [u8; 3]) {
-        let [before, after] = ends.map(|(frame, plane)| (plane.labels()[p], frame.pixels()[p]));
+    fn behind(&self, ends: [Plane<'_>; 2], p: usize) -> (Label, Colors) {
+        let [before, after] = ends.map(|(frame, plane)| (plane.labels()[p], colors((frame, plane), p)));
         match self.areas[&before.0].cmp(&self.areas[&after.0]) {
             Ordering::Less => after,
             Ordering::Greater => before,
@@ -210,8 +213,15 @@ impl Arrivals<'_> {
     }
 }
 
-fn mean(a: [u8; 3], b: [u8; 3]) -> [u8; 3] {
-    std::array::from_fn(|channel| a[channel].midpoint(b[channel]))
+/// What a pixel looks like, and what its label alone would look like there.
+type Colors = [[u8; 3]; 2];
+
+fn colors((frame, labels): Plane<'_>, p: usize) -> Colors {
+    [frame, labels.pure_colors().map_or(frame, |pure| pure)].map(|frame| frame.pixels()[p])
+}
+
+fn mean(a: Colors, b: Colors) -> Colors {
+    std::array::from_fn(|n| std::array::from_fn(|channel| a[n][channel].midpoint(b[n][channel])))
 }
 
 #[cfg(test)]

@@ -39,7 +39,8 @@ pub struct SegmentParams {
     /// Chosen by content: a boundary stays where the colour jumps by this, root mean square of the channels in 8-bit
     /// levels, whatever the noise; in clean pictures, where it jumps by less.
     pub jump_levels: f32,
-    /// Regions of fewer pixels are given to a neighbour.
+    /// Regions of fewer pixels are given to a neighbour, unless they jump by so much more than `jump_levels` that as much
+    /// squared error goes with them.
     pub min_area_px: u32,
 }
 

@@ -333,17 +333,67 @@ fn what_a_lens_blurs_is_no_jump() {
     }
 }
 
+/// A drawing: a black block, and black strokes of `width` pixels on grounds of two colours, which pass between the rows.
+fn stroke_frame(width: f32) -> Frame {
+    let ground = |x: f32| if x < 48.0 { [150.0, 210.0, 240.0] } else { [250.0, 250.0, 245.0] };
+    draw(96, 72, |x, y| {
+        let stroke = (y - 20.2 - 0.11 * x).abs() < 0.5 * width && (8.0..88.0).contains(&x);
+        let block = (40.0..60.0).contains(&x) && (50.0..64.0).contains(&y);
+        if stroke || block { [20.0; 3] } else { ground(x) }
+    })
+}
+
+#[test]
+fn a_stroke_of_an_ink_is_one_region_of_its_colour() {
+    for width in [0.8, 1.0, 1.5] {
+        let frame = stroke_frame(width);
+        let plane = Segmenter::new(96, 72, SegmentParams::new(0)).push(&frame);
+        let row = |x: u32| (20.2 + 0.11 * (x as f32 + 0.5)) as u32;
+        let stroke = plane.label(30, row(30));
+        let pure = plane.pure_colors().expect("labels by content know their colours");
+        for x in 10..86 {
+            let found = (row(x) - 1..=row(x) + 1).find(|&y| plane.label(x, y) == stroke);
+            let y = found.unwrap_or_else(|| panic!("{width}: the stroke ends at {x}"));
+            let color = pure.pixel(x, y);
+            assert!(color.iter().all(|channel| channel.abs_diff(20) < 8), "{width}, {x}: {color:?}");
+        }
+        let raster = Raster::new(96, 72);
+        let pixels: Vec<usize> = (0..raster.len()).filter(|&p| plane.labels()[p] == stroke).collect();
+        for &p in pixels.iter().filter(|&&p| p < 40 * 96) {
+            assert!(raster.sides(p).any(|q| plane.labels()[q] == stroke), "{width}: hangs by a corner at {p}");
+        }
+    }
+}
+
+#[test]
+fn small_things_have_labels_if_their_colour_is_worth_it() {
+    let dot = |color: [f32; 3]| {
+        let frame = draw(48, 48, |x, y| {
+            let is_dot = (20.0..23.0).contains(&x) && (20.0..22.0).contains(&y);
+            let is_block = x < 12.0;
+            if is_dot || is_block { color } else { [90.0, 90.0, 90.0] }
+        });
+        let plane = Segmenter::new(48, 48, SegmentParams::new(0)).push(&frame);
+        plane.label(21, 21) != plane.label(30, 30)
+    };
+    assert!(dot([255.0, 255.0, 40.0]));
+    assert!(!dot([130.0, 130.0, 130.0]));
+}
+
 #[test]
 fn labels_have_no_small_islands() {
-    let frame = draw(120, 90, |x, y| {
-        let spot = ((x / 9.0).fract() - 0.5).hypot((y / 9.0).fract() - 0.5) * 9.0;
-        if spot < (x / 40.0) { [230.0; 3] } else { [25.0; 3] }
-    });
-    let plane = Segmenter::new(120, 90, SegmentParams::new(0)).push(&frame);
-    let labels = plane.labels();
-    let found = pieces(Raster::new(120, 90), |_| true, |p, q| labels[p] == labels[q]);
-    assert!(found.areas.iter().all(|&area| area >= 12), "{:?}", found.areas.iter().min());
-    assert!(found.areas.len() > 10, "{} pieces", found.areas.len());
+    // Spots up to 3 pixels wide: what differs much is worth less room, but some.
+    for (level, least) in [(75.0, 12), (230.0, 4)] {
+        let frame = draw(120, 90, |x, y| {
+            let spot = ((x / 9.0).fract() - 0.5).hypot((y / 9.0).fract() - 0.5) * 9.0;
+            if spot < (x / 40.0) { [level; 3] } else { [25.0; 3] }
+        });
+        let plane = Segmenter::new(120, 90, SegmentParams::new(0)).push(&frame);
+        let labels = plane.labels();
+        let found = pieces(Raster::new(120, 90), |_| true, |p, q| labels[p] == labels[q]);
+        assert!(found.areas.iter().all(|&area| area >= least), "{level}: {:?}", found.areas.iter().min());
+        assert!(found.areas.len() > 10, "{level}: {} pieces", found.areas.len());
+    }
 }
 
 #[test]

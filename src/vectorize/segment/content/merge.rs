@@ -17,7 +17,21 @@ pub(super) struct MergeRules {
     pub(super) jump: f32,
     /// Fewest pixels of a region.
     pub(super) min_area: u32,
+    /// The jump that a region of so few must have, in levels; with a greater one fewer will do.
+    pub(super) worth: f32,
 }
+
+impl MergeRules {
+    /// Whether a region of so many pixels is not worth this jump at its weakest boundary. What counts is the squared error
+    /// that it takes away.
+    fn is_small(&self, area: u32, jump: f32) -> bool {
+        area < self.min_area
+            && (area < LEAST_AREA || area as f32 * jump.powi(2) < self.min_area as f32 * self.worth.powi(2))
+    }
+}
+
+/// Fewest pixels of a region, whatever its colour.
+const LEAST_AREA: u32 = 4;
 
 /// A boundary between two regions.
 #[derive(Debug, Clone, Copy, Default)]
@@ -59,7 +73,19 @@ pub(super) struct Mixed {
 }
 
 impl Mixed {
-    /// Takes a frame's boundaries in. All together weigh as much as a boundary around the picture, the last frames most.
+    /// Takes in the boundaries of a frame's regions that jump by `jump`.
+    pub(super) fn learn(&mut self, raster: Raster, pixels: &[Pixel], jump: f32) {
+        let regions = count(pixels) as usize;
+        let (boundaries, _) = survey(raster, pixels, &mut Forest::new(regions), regions);
+        self.follow(boundaries.values().filter(|boundary| boundary.jump() >= jump), raster);
+    }
+
+    /// Whether colours usually jump within a pixel.
+    pub(super) fn is_sharp(self) -> bool {
+        self.sides > 0.0 && self.sum <= WIDEST * self.sides
+    }
+
+    /// Takes boundaries in. All together weigh as much as a boundary around the picture, the last frames most.
     fn follow<'a>(&mut self, boundaries: impl Iterator<Item = &'a Boundary>, raster: Raster) {
         for boundary in boundaries {
             self.sides += boundary.sides as f32;
@@ -83,20 +109,19 @@ pub(super) struct Regions {
     pub(super) beside: Vec<Vec<Region>>,
 }
 
-/// Joins regions. `usual` is the slab's so far.
-pub(super) fn merge(raster: Raster, pixels: &mut [Pixel], rules: MergeRules, usual: &mut Mixed) -> Regions {
-    let regions = pixels.iter().map(|pixel| pixel.region.max(pixel.minor) + 1).max().unwrap_or(0);
+/// Joins regions, `usual` being what is usual in the slab so far.
+pub(super) fn merge(raster: Raster, pixels: &mut [Pixel], rules: MergeRules, usual: Mixed) -> Regions {
+    let regions = count(pixels);
     let mut forest = Forest::new(regions as usize);
     let (mut boundaries, mut areas) = survey(raster, pixels, &mut forest, regions as usize);
-    usual.follow(boundaries.values().filter(|boundary| boundary.jump() >= rules.jump), raster);
     loop {
         // Every region's weakest boundary at once (Boruvka 1926): a survey costs more than the rest.
         let mut weakest: Vec<Option<(f32, Region)>> = vec![None; regions as usize];
         for (&(a, b), boundary) in &boundaries {
             for (own, other) in [(a, b), (b, a)] {
                 // A small region has to join someone, but nobody has to join a small region.
-                let is_small = areas[own as usize] < rules.min_area;
-                let jump = if boundary.is_sharp(*usual) { boundary.jump() } else { 0.0 };
+                let jump = if boundary.is_sharp(usual) { boundary.jump() } else { 0.0 };
+                let is_small = rules.is_small(areas[own as usize], jump);
                 let jump = jump - if is_small { SMALL } else { 0.0 };
                 if jump < rules.jump && weakest[own as usize].is_none_or(|(least, _)| jump < least) {
                     weakest[own as usize] = Some((jump, other));
@@ -116,6 +141,11 @@ pub(super) fn merge(raster: Raster, pixels: &mut [Pixel], rules: MergeRules, usu
         }
         (boundaries, areas) = survey(raster, pixels, &mut forest, regions as usize);
     }
+}
+
+/// One more than the highest region.
+fn count(pixels: &[Pixel]) -> Region {
+    pixels.iter().map(|pixel| pixel.region.max(pixel.minor) + 1).max().unwrap_or(0)
 }
 
 /// More than any jump.

@@ -5,6 +5,7 @@
 //! own; `merge` gives up boundaries that are weak, and `naming` gives labels to regions such that they last.
 
 mod forest;
+mod inks;
 mod merge;
 mod naming;
 mod unmix;
@@ -12,7 +13,7 @@ mod zones;
 
 use merge::{MergeRules, Mixed, merge};
 use naming::{Before, Palette};
-use unmix::unmix;
+use unmix::{unmix, unmix_with_inks};
 use zones::find_zones;
 
 use super::SegmentParams;
@@ -80,11 +81,14 @@ impl Content {
             return labels.clone();
         }
         let zones = find_zones(self.raster, frame);
+        let jump = (NOISE_JUMP * zones.roughness(self.raster, frame)).clamp(LEAST_JUMP, self.params.jump_levels);
         let mut pixels = unmix(self.raster, frame, &zones);
-        let noise = zones.roughness(self.raster, frame);
-        let jump = (NOISE_JUMP * noise).clamp(LEAST_JUMP, self.params.jump_levels);
-        let rules = MergeRules { jump, min_area: self.params.min_area_px };
-        let regions = merge(self.raster, &mut pixels, rules, &mut self.usual);
+        self.usual.learn(self.raster, &pixels, jump);
+        if self.usual.is_sharp() {
+            pixels = unmix_with_inks(self.raster, frame, zones);
+        }
+        let rules = MergeRules { jump, min_area: self.params.min_area_px, worth: self.params.jump_levels };
+        let regions = merge(self.raster, &mut pixels, rules, self.usual);
         let levels = pyramid(frame);
         let plane = match &self.before {
             // Whatever moved, there is nothing that a name would tell apart.
@@ -97,10 +101,19 @@ impl Content {
                 });
                 let names = self.palette.name(self.raster, frame, &pixels, &regions, before);
                 let labels = pixels.iter().map(|pixel| Label(names[pixel.region as usize])).collect();
-                LabelPlane::new(frame.width(), frame.height(), labels)
+                LabelPlane::new(frame.width(), frame.height(), labels).with_pure_colors(pure_colors(frame, &pixels))
             }
         };
         self.before = Some((frame.clone(), levels, plane.clone()));
         plane
     }
+}
+
+/// What each pixel's region looks like there.
+fn pure_colors(frame: &Frame, pixels: &[Pixel]) -> Frame {
+    let mut pure = frame.clone();
+    for (color, pixel) in pure.pixels_mut().iter_mut().zip(pixels) {
+        *color = pixel.color.to_array().map(|channel| (channel + 0.5) as u8);
+    }
+    pure
 }

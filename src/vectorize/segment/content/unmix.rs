@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use super::super::raster::Raster;
 use super::forest::Forest;
+use super::inks::Inks;
 use super::zones::{IMPURE, Zones};
 use super::{Pixel, Region};
 use crate::video::Frame;
@@ -20,23 +21,23 @@ const STROKE_REACH: isize = 2;
 const RESIDUE: f32 = 3.0 * 14.0 * 14.0;
 /// Part of a pixel from which on a stroke has it: less than half, as thin strokes would tear where they pass between
 /// pixels.
-const STROKE_PART: f32 = 0.4;
+pub(super) const STROKE_PART: f32 = 0.4;
 
 /// A region near a pixel, with its mean colour there.
 #[derive(Debug, Clone, Copy)]
-struct Candidate {
-    region: Region,
-    color: Vec3,
+pub(super) struct Candidate {
+    pub(super) region: Region,
+    pub(super) color: Vec3,
 }
 
 /// An account of a pixel.
 #[derive(Debug, Clone, Copy)]
-struct Blend {
-    major: Candidate,
+pub(super) struct Blend {
+    pub(super) major: Candidate,
     minor: Candidate,
     /// Which part of the pixel the major one has.
-    part: f32,
-    error: f32,
+    pub(super) part: f32,
+    pub(super) error: f32,
 }
 
 impl Blend {
@@ -47,7 +48,7 @@ impl Blend {
     }
 
     /// Two in the parts that come closest to `color`; from the part `majority` on the pixel is the first one's.
-    fn of_two(color: Vec3, first: Candidate, second: Candidate, majority: f32) -> Self {
+    pub(super) fn of_two(color: Vec3, first: Candidate, second: Candidate, majority: f32) -> Self {
         let along = first.color - second.color;
         let part = ((color - second.color).dot(along) / along.length_squared().max(1.0)).clamp(0.0, 1.0);
         let error = color.distance_squared(second.color.lerp(first.color, part));
@@ -75,20 +76,48 @@ impl Blend {
 
 /// Takes every pixel apart.
 pub(super) fn unmix(raster: Raster, frame: &Frame, zones: &Zones) -> Vec<Pixel> {
-    let colors: Vec<Vec3> = frame.pixels().iter().map(|c| Vec3::from_array(c.map(f32::from))).collect();
-    let near: Vec<Vec<Candidate>> = (0..raster.len())
-        .map(|p| if zones.of_pixel[p] == IMPURE { candidates(raster, &colors, zones, p) } else { Vec::new() })
-        .collect();
-    let blends: Vec<Option<Blend>> = (0..raster.len()).map(|p| best_blend(colors[p], &near[p])).collect();
-    let strokes = Strokes::new(raster, zones, &colors, &blends);
+    let colors = colors(frame);
+    take_apart(raster, &colors, &colors, zones)
+}
+
+/// The same of a drawing: strokes and small things may have colours that are pure elsewhere.
+pub(super) fn unmix_with_inks(raster: Raster, frame: &Frame, mut zones: Zones) -> Vec<Pixel> {
+    let colors = colors(frame);
+    let (near, blends) = accounts(raster, &colors, &colors, &zones);
+    let inks = Inks::new(&zones, &colors);
+    let mut pure = colors.clone();
+    inks.claim(raster, &mut zones, &mut pure, (&near, &blends));
+    take_apart(raster, &colors, &pure, &zones)
+}
+
+fn colors(frame: &Frame) -> Vec<Vec3> {
+    frame.pixels().iter().map(|c| Vec3::from_array(c.map(f32::from))).collect()
+}
+
+/// `pure` are the colours of zones' pixels.
+fn take_apart(raster: Raster, colors: &[Vec3], pure: &[Vec3], zones: &Zones) -> Vec<Pixel> {
+    let (near, blends) = accounts(raster, colors, pure, zones);
+    let strokes = Strokes::new(raster, zones, colors, &blends);
     (0..raster.len())
-        .map(|p| {
-            if zones.of_pixel[p] != IMPURE {
-                return Pixel::pure(zones.of_pixel[p], colors[p]);
-            }
-            strokes.account(raster, &colors, p, &near[p], blends[p])
+        .map(|p| match zones.of_pixel[p] {
+            IMPURE => strokes.account(raster, colors, p, &near[p], blends[p]),
+            zone => Pixel::pure(zone, pure[p]),
         })
         .collect()
+}
+
+/// What zones lie around each pixel that is of none, and its best blend of them.
+fn accounts(
+    raster: Raster,
+    colors: &[Vec3],
+    pure: &[Vec3],
+    zones: &Zones,
+) -> (Vec<Vec<Candidate>>, Vec<Option<Blend>>) {
+    let near: Vec<Vec<Candidate>> = (0..raster.len())
+        .map(|p| if zones.of_pixel[p] == IMPURE { candidates(raster, pure, zones, p) } else { Vec::new() })
+        .collect();
+    let blends = (0..raster.len()).map(|p| best_blend(colors[p], &near[p])).collect();
+    (near, blends)
 }
 
 /// The zones around a pixel, nearer pixels counting more.
@@ -182,7 +211,7 @@ fn is_alike(a: Vec3, b: Vec3) -> bool {
 }
 
 /// Calls `found(q, squared distance)` for the pixels within `reach` rows and columns of `p`.
-fn around(raster: Raster, p: usize, reach: isize, mut found: impl FnMut(usize, isize)) {
+pub(super) fn around(raster: Raster, p: usize, reach: isize, mut found: impl FnMut(usize, isize)) {
     let (x, y) = raster.xy(p);
     for dy in -reach..=reach {
         for dx in -reach..=reach {
