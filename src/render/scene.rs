@@ -10,7 +10,7 @@ use super::parallel::{List, fill_chunks};
 use super::refiner::{FineNode, Refiner, Span, fine_color};
 use super::second::Second;
 use super::slice::{SLICES, above, blend, cross, edges_on};
-use crate::mesh::{Domain, TetMesh};
+use crate::mesh::{Domain, MeshCounts, MeshTail, TetMesh};
 
 /// First-level children that the second level may hold before it starts anew; or four times what a picture needs, if
 /// that is more. About 150 bytes each.
@@ -87,19 +87,35 @@ impl Scene {
     /// Takes in what `mesh` gained since the last call. It must be the same mesh, changed at the ends of its arrays
     /// only; its duration may change.
     pub fn extend(&mut self, mesh: &TetMesh) {
-        let (nodes, tets) = (self.complex.nodes.len(), self.complex.tets.len());
-        self.domain = mesh.domain;
+        let known = self.counts();
         let moved = self.complex.extend(mesh);
+        self.take_in(&mesh.tail(known), &moved);
+    }
+
+    /// Takes in what a mesh gained: all tails, one after the other, are [`Self::extend`] with the mesh.
+    pub fn append(&mut self, tail: &MeshTail<'_>) {
+        let moved = self.complex.append(tail);
+        self.take_in(tail, &moved);
+    }
+
+    fn counts(&self) -> MeshCounts {
+        let Complex { points, nodes, tets, .. } = &self.complex;
+        MeshCounts { vertices: points.len(), wedges: nodes.len(), tets: tets.len() }
+    }
+
+    /// Takes in what the complex has taken in, given the points that changed sides.
+    fn take_in(&mut self, tail: &MeshTail<'_>, moved: &[u32]) {
+        self.domain = tail.domain;
         if !moved.is_empty() {
-            self.refiner.forget_around(&self.complex, &moved);
+            self.refiner.forget_around(&self.complex, moved);
             self.second = Second::default();
         }
-        self.colors.extend(mesh.wedges[nodes..].iter().map(|wedge| fine_color(wedge.color)));
+        self.colors.extend(tail.wedges.iter().map(|wedge| fine_color(wedge.color)));
         let complex = &self.complex;
         let node = |node: usize| FineNode { position: complex.position(node as u32), color: self.colors[node] };
-        self.nodes.extend((nodes..complex.nodes.len()).map(node));
+        self.nodes.extend((self.nodes.len()..complex.nodes.len()).map(node));
         let span = |corners: &[u32; 4]| Span::of(corners.map(|node| complex.position(node)));
-        self.spans.extend(self.complex.tets[tets..].iter().map(span));
+        self.spans.extend(self.complex.tets[self.spans.len()..].iter().map(span));
     }
 
     /// Brings what is known of interfaces up to date. False if there are none.
