@@ -1,15 +1,17 @@
 //! A slab as it is drawn: the control mesh as far as it has come, and the levels refined so far.
 
-use glam::{DVec2, IVec3, Vec3};
+use glam::IVec3;
 
 use super::active::Active;
+use super::canvas::ColorSpace;
 use super::complex::{Complex, FINE_BITS};
-use super::draw::{Painters, Pieces};
+use super::draw::Pieces;
 use super::interfaces::{Faces, Interfaces, child_faces};
+use super::paint::Painters;
 use super::parallel::{List, fill_chunks};
 use super::refiner::{FineNode, Refiner, Span, fine_color};
 use super::second::Second;
-use super::slice::{SLICES, above, blend, cross, edges_on};
+use super::slice::{Polygon, SliceNode, slice};
 use crate::mesh::{Domain, MeshCounts, MeshTail, TetMesh};
 
 /// First-level children that the second level may hold before it starts anew; or four times what a picture needs, if
@@ -30,7 +32,9 @@ pub struct Scene {
     /// One a node, in fine levels.
     colors: Vec<IVec3>,
     /// One a node: its position and colour side by side.
-    nodes: Vec<FineNode>,
+    nodes: Vec<SliceNode>,
+    /// What their colours are in.
+    space: ColorSpace,
     spans: Vec<Span>,
     active: Active,
     /// As of the last anti-aliased picture.
@@ -44,18 +48,6 @@ pub struct Scene {
     pub(super) painters: Painters,
 }
 
-/// A polygon's corner: its place in fine units, and its colour.
-pub(super) type Corner = (DVec2, Vec3);
-
-/// A tet's part of a slice.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Polygon<'a> {
-    /// 3 or 4; convex.
-    pub(super) corners: &'a [Corner],
-    /// Edges that lie between labels, as far as interfaces are known; bit i: the edge from corner i to the next.
-    pub(super) boundary: u8,
-}
-
 impl Scene {
     /// A scene without tets.
     pub fn new(domain: Domain) -> Self {
@@ -64,6 +56,7 @@ impl Scene {
             complex: Complex::default(),
             colors: Vec::new(),
             nodes: Vec::new(),
+            space: ColorSpace::Rgb,
             spans: Vec::new(),
             active: Active::new(domain.unit() << FINE_BITS),
             interfaces: Interfaces::new(),
@@ -111,11 +104,23 @@ impl Scene {
             self.second = Second::default();
         }
         self.colors.extend(tail.wedges.iter().map(|wedge| fine_color(wedge.color)));
-        let complex = &self.complex;
-        let node = |node: usize| FineNode { position: complex.position(node as u32), color: self.colors[node] };
-        self.nodes.extend((self.nodes.len()..complex.nodes.len()).map(node));
-        let span = |corners: &[u32; 4]| Span::of(corners.map(|node| complex.position(node)));
+        for node in self.nodes.len()..self.complex.nodes.len() {
+            self.nodes.push(self.slice_node(node));
+        }
+        let span = |corners: &[u32; 4]| Span::of(corners.map(|node| self.complex.position(node)));
         self.spans.extend(self.complex.tets[self.spans.len()..].iter().map(span));
+    }
+
+    fn slice_node(&self, node: usize) -> SliceNode {
+        let position = self.complex.position(node as u32);
+        SliceNode::new(&FineNode { position, color: self.colors[node] }, self.space)
+    }
+
+    /// From now on polygons have their colours in the channels of a canvas of this kind.
+    pub(super) fn color_in(&mut self, space: ColorSpace) {
+        if std::mem::replace(&mut self.space, space) != space {
+            self.nodes = (0..self.nodes.len()).map(|node| self.slice_node(node)).collect();
+        }
     }
 
     /// Brings what is known of interfaces up to date. False if there are none.
@@ -136,14 +141,20 @@ impl Scene {
     ) {
         if levels == 0 {
             let tets = self.active.cut(&self.spans, t);
-            let corners = |tet: u32| self.complex.tets[tet as usize].map(|node| self.nodes[node as usize]);
+            let corners = |tet: u32| {
+                let [a, b, c, d] = self.complex.tets[tet as usize];
+                let node = |node: u32| self.nodes[node as usize];
+                [node(a), node(b), node(c), node(d)]
+            };
             return fill_chunks(lists, tets.len(), CHUNK, |list, run| {
                 for tets in tets[run].chunks(BATCH) {
                     // Nodes lie far apart: fetched in one go, the waits for them overlap.
-                    let mut nodes = [[FineNode::ZERO; 4]; BATCH];
+                    let mut nodes = [[SliceNode::ZERO; 4]; BATCH];
                     nodes.iter_mut().zip(tets).for_each(|(nodes, &tet)| *nodes = corners(tet));
-                    for (nodes, &tet) in nodes.iter().zip(tets) {
-                        slice(nodes, t, self.interfaces.faces(tet), |polygon| make(list, tet, polygon));
+                    for ([a, b, c, d], &tet) in nodes.iter().zip(tets) {
+                        if let Some(polygon) = slice([a, b, c, d], t, self.interfaces.faces(tet)) {
+                            make(list, tet, polygon);
+                        }
                     }
                 }
             });
@@ -156,7 +167,12 @@ impl Scene {
                 self.second = Second::default();
             }
             return collect(lists, &tets, |polygons, tet| {
-                let parent = Parent { level: (&self.refiner, &self.complex), tet, faces: self.interfaces.faces(tet) };
+                let parent = Parent {
+                    level: (&self.refiner, &self.complex),
+                    tet,
+                    faces: self.interfaces.faces(tet),
+                    space: self.space,
+                };
                 parent.slice_children(t, |polygon| make(polygons, tet, polygon));
             });
         }
@@ -167,7 +183,7 @@ impl Scene {
             let control = second.parent(tet);
             let child = self.refiner.children(control)[tet as usize % 8];
             let faces = child_faces(child, self.interfaces.faces(control));
-            let parent = Parent { level: second.level(), tet, faces };
+            let parent = Parent { level: second.level(), tet, faces, space: self.space };
             parent.slice_children(t, |polygon| make(polygons, control, polygon));
         });
     }
@@ -218,31 +234,17 @@ struct Parent<'a> {
     tet: u32,
     /// Its faces between labels.
     faces: Faces,
+    space: ColorSpace,
 }
 
 impl Parent<'_> {
     #[inline]
     fn slice_children(&self, t: i32, mut polygon: impl FnMut(Polygon<'_>)) {
         let (refiner, complex) = self.level;
-        let nodes = refiner.ten(complex, self.tet);
+        let nodes = refiner.ten(complex, self.tet).map(|node| SliceNode::new(&node, self.space));
         for child in refiner.children(self.tet) {
-            slice(&child.map(|i| nodes[i as usize]), t, child_faces(*child, self.faces), &mut polygon);
+            let faces = child_faces(*child, self.faces);
+            slice(child.map(|i| &nodes[usize::from(i)]), t, faces).into_iter().for_each(&mut polygon);
         }
     }
-}
-
-/// Slices one tet.
-#[inline]
-fn slice(nodes: &[FineNode; 4], t: i32, faces: Faces, mut polygon: impl FnMut(Polygon<'_>)) {
-    let edges = SLICES[above(nodes.map(|node| node.position), t)];
-    if edges.is_empty() {
-        return;
-    }
-    let mut corners = [Corner::default(); 4];
-    for (corner, ends) in corners.iter_mut().zip(edges) {
-        let [below, above] = ends.map(|end| &nodes[end as usize]);
-        let (part, place) = cross(below.position, above.position, t);
-        *corner = (place, blend(below.levels(), above.levels(), part));
-    }
-    polygon(Polygon { corners: &corners[..edges.len()], boundary: edges_on(edges, faces) });
 }
