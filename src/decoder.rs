@@ -13,7 +13,7 @@ mod slab;
 use thiserror::Error;
 
 use self::ahead::Ahead;
-use self::reader::Parsed;
+use self::reader::{Brought, Parsed};
 use self::slab::Slab;
 use crate::bitstream::{ParseError, SequenceHeader};
 pub use crate::render::Viewport;
@@ -80,6 +80,8 @@ pub struct Decoder {
     header: Option<SequenceHeader>,
     /// What can be drawn.
     slab: Option<Slab>,
+    /// What could be drawn before a flush, in case that its packets come again.
+    flushed: Option<Slab>,
     /// Threads of our own; `None`: those of whoever calls.
     #[cfg(feature = "threads")]
     pool: ahead::Pool,
@@ -107,6 +109,7 @@ impl Decoder {
             ahead: Ahead::new(),
             header: None,
             slab: None,
+            flushed: None,
         }
     }
 
@@ -158,14 +161,28 @@ impl Decoder {
     }
 
     /// Notes what a packet brought.
-    fn take(&mut self, Parsed { packet, growth }: Parsed) -> Result<PacketInfo, DecodeError> {
+    fn take(&mut self, Parsed { packet, brought }: Parsed) -> Result<PacketInfo, DecodeError> {
         let packet = packet?;
-        if let Some(growth) = growth {
-            let slab = || Slab::new(growth.header, growth.first_frame, growth.tail.domain);
-            let slab = if packet.keyframe { self.slab.insert(slab()) } else { self.slab.get_or_insert_with(slab) };
-            self.header = Some(growth.header);
-            slab.grow(growth);
+        match brought {
+            Some(Brought::Growth(growth)) => {
+                self.flushed = None;
+                if growth.is_whole {
+                    self.slab = None;
+                }
+                let slab = || Slab::new(growth.header, growth.first_frame, growth.tail.domain);
+                self.slab.get_or_insert_with(slab).grow(growth);
+            }
+            Some(Brought::Again(progress)) => {
+                if self.slab.is_none() {
+                    self.slab = self.flushed.take();
+                }
+                if let Some(slab) = &mut self.slab {
+                    slab.come_to(progress);
+                }
+            }
+            None => (),
         }
+        self.header = self.slab.as_ref().map(Slab::header);
         Ok(PacketInfo { frame_number: packet.frame_number, keyframe: packet.keyframe, picture: packet.picture })
     }
 
@@ -226,12 +243,16 @@ impl Decoder {
         (drawn, self.take(parsed))
     }
 
-    /// Forgets everything, packets that are queued included, and waits for a keyframe. Does not wait for a packet that
-    /// is being decoded.
+    /// Forgets what can be drawn and packets that are queued, and waits for a keyframe, and for a packet that is being
+    /// decoded. If the keyframe is the one before the flush again, it and the packets behind it that were decoded before
+    /// cost nothing: a seek back costs as much as drawing.
     pub fn flush(&mut self) {
-        self.ahead.flush();
+        for parsed in self.ahead.flush() {
+            // What it brought is part of what is flushed.
+            let _ = self.take(parsed);
+        }
         self.header = None;
-        self.slab = None;
+        self.flushed = self.slab.take().or(self.flushed.take());
     }
 }
 

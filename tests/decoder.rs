@@ -158,6 +158,55 @@ fn a_flush_forgets_what_is_queued() {
     }
 }
 
+/// Packets that come again after a flush bring what they brought at first, wherever the flush came, and so does what is
+/// new behind them.
+#[test]
+fn packets_that_come_again_bring_the_same() {
+    let (first, _) = slab(0, 3);
+    let (second, _) = slab(u64::from(FRAMES), 4);
+    let whole = [&first[..], &second[..]].concat();
+    for levels in [0, 1] {
+        let expected = play_in_turns(&mut decoder(levels), &whole);
+        let mut decoder = decoder(levels);
+        for (played, ahead) in [(1, 0), (5, 0), (3, 4), (9, 0), (9, 1), (12, 3), (18, 0)] {
+            assert!(play_ahead(&mut decoder, &whole, ahead) == expected, "level {levels}");
+            decoder.flush();
+            assert!(play_ahead(&mut decoder, &whole[..played], ahead) == expected[..played], "{played} packets");
+            whole[played..].iter().take(ahead).for_each(|packet| decoder.queue_packet(packet.data.clone()));
+            decoder.flush();
+        }
+    }
+}
+
+/// What else comes after a flush, or between packets that come again, is judged as by a new decoder.
+#[test]
+fn what_comes_instead_of_known_packets_is_judged_by_itself() {
+    let (known, _) = slab(0, 3);
+    let (other, _) = slab(0, 4);
+    let damaged = |k: usize| {
+        let mut packet = known[k].clone();
+        let last = packet.data.len() - 1;
+        packet.data[last] ^= 1;
+        packet
+    };
+    let sequences = [
+        other.clone(),
+        vec![known[0].clone(), known[1].clone(), known[3].clone(), known[4].clone(), known[0].clone()],
+        vec![known[0].clone(), damaged(1), known[2].clone(), other[0].clone(), known[1].clone()],
+        vec![damaged(0), known[1].clone(), known[0].clone(), known[1].clone()],
+        vec![known[2].clone(), known[3].clone(), other[0].clone(), other[1].clone()],
+        vec![known[0].clone(), other[1].clone(), other[2].clone(), known[0].clone()],
+        vec![known[0].clone(), known[1].clone(), other[0].clone(), other[1].clone(), known[2].clone()],
+    ];
+    for (number, sequence) in sequences.iter().enumerate() {
+        let expected = play_in_turns(&mut decoder(0), sequence);
+        let mut decoder = decoder(0);
+        play_in_turns(&mut decoder, &known);
+        decoder.flush();
+        assert!(play_in_turns(&mut decoder, sequence) == expected, "sequence {number}");
+    }
+}
+
 /// A packet that is sent comes behind those queued.
 #[test]
 fn sending_takes_what_is_queued_before() {

@@ -44,8 +44,6 @@ struct State {
     bytes: usize,
     /// A worker is at it, or will be.
     has_worker: bool,
-    /// Flushes so far: what was begun before one is forgotten.
-    flushes: u64,
 }
 
 impl State {
@@ -70,21 +68,18 @@ impl Shared {
     /// Parses a packet, without the lock, and notes what it brought.
     fn parse<'a>(
         &'a self,
-        mut state: MutexGuard<'a, State>,
+        state: MutexGuard<'a, State>,
         (mut reader, packet): (Box<Reader>, Vec<u8>),
     ) -> MutexGuard<'a, State> {
-        let flushes = state.flushes;
         drop(state);
-        let outcome = catch_unwind(AssertUnwindSafe(|| reader.read(&packet)));
-        state = self.lock();
-        if state.flushes == flushes {
-            if outcome.is_err() {
-                *reader = Reader::new();
-            }
-            state.bytes += bytes(&outcome);
-            state.parsed.push_back(outcome);
-            state.reader = Some(reader);
+        let outcome = catch_unwind(AssertUnwindSafe(|| reader.read(packet)));
+        if outcome.is_err() {
+            *reader = Reader::new();
         }
+        let mut state = self.lock();
+        state.bytes += bytes(&outcome);
+        state.parsed.push_back(outcome);
+        state.reader = Some(reader);
         self.parsed.notify_all();
         state
     }
@@ -113,7 +108,6 @@ impl Ahead {
             parsed: VecDeque::new(),
             bytes: 0,
             has_worker: false,
-            flushes: 0,
         };
         Self { shared: Arc::new(Shared { state: Mutex::new(state), parsed: Condvar::new() }) }
     }
@@ -164,25 +158,31 @@ impl Ahead {
         // Another stands in, in case that this one panics.
         let reader = self.shared.lock().reader.replace(Box::new(Reader::new()));
         let mut reader = reader.unwrap_or_else(|| Box::new(Reader::new()));
-        let parsed = reader.read(packet);
+        let parsed = reader.read(packet.to_vec());
         self.shared.lock().reader = Some(reader);
         parsed
     }
 
-    /// Forgets all packets, and what went before them. Does not wait for a packet that is being parsed.
-    pub(super) fn flush(&self) {
+    /// Forgets the packets that wait. Hands out what those brought that were parsed, once it is known what the one brings
+    /// that is being parsed: packets that are the same need not be parsed again.
+    pub(super) fn flush(&self) -> Vec<Parsed> {
         let mut state = self.shared.lock();
-        state.flushes += 1;
         state.waiting.clear();
-        state.parsed.clear();
+        while state.reader.is_none() {
+            state = self.shared.parsed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        if let Some(reader) = &mut state.reader {
+            reader.flush();
+        }
         state.bytes = 0;
-        state.reader = Some(Box::new(Reader::new()));
+        // After a panic nothing is known.
+        state.parsed.drain(..).filter_map(Result::ok).collect()
     }
 }
 
 impl Drop for Ahead {
     /// A worker that is at a packet ends after it.
     fn drop(&mut self) {
-        self.flush();
+        self.shared.lock().waiting.clear();
     }
 }

@@ -1,6 +1,6 @@
 //! The slab that is drawn: what packets brought of it, and which of its pictures there are.
 
-use super::reader::Growth;
+use super::reader::{Growth, Progress};
 use super::{DecodeError, DecoderConfig, RenderParams};
 use crate::bitstream::SequenceHeader;
 use crate::mesh::{Domain, MeshCounts, TetMesh};
@@ -39,12 +39,18 @@ impl Slab {
 
     /// Takes in what a packet brought.
     pub(super) fn grow(&mut self, growth: Growth) {
-        self.last_frame = if growth.is_last {
-            f64::from(growth.tail.domain.duration)
-        } else {
-            f64::from(growth.frames) - self.scene.time_step()
-        };
+        self.come_to(growth.progress);
         self.behind.push(growth.tail);
+    }
+
+    /// Notes how far it has come; not so far as before where its packets come again.
+    pub(super) fn come_to(&mut self, Progress { frames, ended }: Progress) {
+        self.last_frame = ended.map_or_else(|| f64::from(frames) - self.scene.time_step(), f64::from);
+    }
+
+    /// The header of its keyframe.
+    pub(super) fn header(&self) -> SequenceHeader {
+        self.header
     }
 
     /// What is drawn for these parameters; the scene is brought up to it.

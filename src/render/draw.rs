@@ -219,10 +219,11 @@ impl Scene {
         self.color_in(space);
         let making = Making { view: &view, space, antialias };
         let mut lists = std::mem::take(&mut self.pieces);
-        self.cut(t, params.levels, &mut lists, |list, _, polygon| list.push(&making, &polygon));
+        let part = params.viewport.map(|viewport| (viewport, (surface.width(), surface.height())));
+        self.cut(t, params.levels, part, &mut lists, |list, _, polygon| list.push(&making, &polygon));
         let mut outlines: Vec<Vec<(Outline, u8)>> = Vec::new();
         if params.mesh {
-            self.cut(t, 0, &mut outlines, |list, _, polygon| {
+            self.cut(t, 0, part, &mut outlines, |list, _, polygon| {
                 list.push((Outline::of_places(view.places(&polygon)), polygon.count));
             });
         }

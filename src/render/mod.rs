@@ -34,6 +34,7 @@ mod shade;
 mod slice;
 mod subdivide;
 mod view;
+mod window;
 
 pub use complex::{FINE_BITS, Node};
 pub use draw::{DrawParams, draw};

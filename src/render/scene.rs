@@ -12,6 +12,8 @@ use super::parallel::{List, fill_chunks};
 use super::refiner::{FineNode, Refiner, Span, fine_color};
 use super::second::Second;
 use super::slice::{Polygon, SliceNode, slice};
+use super::view::Viewport;
+use super::window::Extents;
 use crate::mesh::{Domain, MeshCounts, MeshTail, TetMesh};
 
 /// First-level children that the second level may hold before it starts anew; or four times what a picture needs, if
@@ -37,6 +39,8 @@ pub struct Scene {
     space: ColorSpace,
     spans: Vec<Span>,
     active: Active,
+    /// As of the last picture of a part.
+    extents: Extents,
     /// As of the last anti-aliased picture.
     interfaces: Interfaces,
     /// Level 1; empty until it is first asked for.
@@ -59,6 +63,7 @@ impl Scene {
             space: ColorSpace::Rgb,
             spans: Vec::new(),
             active: Active::new(domain.unit() << FINE_BITS),
+            extents: Extents::default(),
             interfaces: Interfaces::new(),
             refiner: Refiner::default(),
             second: Second::default(),
@@ -131,16 +136,25 @@ impl Scene {
 
     /// Cuts the scene, subdivided `levels` times, at `t` (fine units). `make` appends to a list what the caller keeps
     /// of each polygon, given the control tet. Lists, one after the other, hold polygons in the order
-    /// of control tets and of children; what was in them is gone.
+    /// of control tets and of children; what was in them is gone. Given a part of the picture, and the size of the surface
+    /// that it is stretched over, polygons that are not seen there may be left out.
     pub(super) fn cut<L: List>(
         &mut self,
         t: i32,
         levels: u8,
+        part: Option<(Viewport, (u32, u32))>,
         lists: &mut Vec<L>,
         make: impl Fn(&mut L, u32, Polygon<'_>) + Sync + Send,
     ) {
         if levels == 0 {
-            let tets = self.active.cut(&self.spans, t);
+            let mut tets = self.active.cut(&self.spans, t);
+            let seen: Vec<u32>;
+            if let Some((viewport, size)) = part {
+                self.extents.extend(&self.domain, &self.complex);
+                let window = self.extents.window(&self.domain, &viewport, size);
+                seen = tets.iter().copied().filter(|&tet| self.extents.is_seen(tet, &window)).collect();
+                tets = &seen;
+            }
             let corners = |tet: u32| {
                 let [a, b, c, d] = self.complex.tets[tet as usize];
                 let node = |node: u32| self.nodes[node as usize];

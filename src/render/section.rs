@@ -29,7 +29,7 @@ pub fn cross_section(mesh: &TetMesh, frame: f64, levels: u8) -> Vec<SectionPolyg
     scene.extend(mesh);
     let fine = f64::from(mesh.domain.unit()) * f64::from(1 << FINE_BITS);
     let mut lists: Vec<Vec<SectionPolygon>> = Vec::new();
-    scene.cut(plane(&mesh.domain, frame), levels, &mut lists, |polygons, tet, polygon| {
+    scene.cut(plane(&mesh.domain, frame), levels, None, &mut lists, |polygons, tet, polygon| {
         let count = usize::from(polygon.count);
         polygons.push(SectionPolygon {
             tet,
