@@ -5,7 +5,6 @@ mod pipeline;
 use std::time::Duration;
 
 use gst::ClockTime;
-use gst::prelude::*;
 use pipeline::{Outcome, encode, init, raw, time_of};
 
 /// Longer than upstream may take for a packet that it has in store.

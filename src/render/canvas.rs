@@ -1,6 +1,6 @@
 //! The pixels of a band of rows on their way to a surface: four bytes each, in the channels of the surface.
 //!
-//! In: runs of pixels that a [`Run`](super::shade::Run) fills in, single colours. Out: rows of pixels. Where the surface is
+//! In: runs of pixels that a [`Run`](super::run::Run) fills in, single colours. Out: rows of pixels. Where the surface is
 //! Y'CbCr so is the canvas: colours are converted at the corners of polygons, not at pixels. Channels lie side by side, as
 //! most runs are a few pixels long: all that is written of one is in one place.
 

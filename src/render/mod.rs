@@ -1,7 +1,7 @@
 //! From a slab's control mesh to pixels: subdivide, slice at a time, fill, pack into the pixel format.
 //!
 //! ```text
-//! complex -> rings -> level | refiner -> slice -> scan, shade -> canvas -> crossed -> pack
+//! complex -> rings -> level | refiner -> slice -> scan, run -> canvas -> crossed -> pack
 //! ```
 //!
 //! In: a mesh, a time, a size. Out: pixels; for the fit also masks ([`color_masks`], [`position_masks`]) and where
@@ -25,6 +25,7 @@ mod paint;
 mod parallel;
 mod refiner;
 mod rings;
+mod run;
 mod sample;
 mod scan;
 mod scene;

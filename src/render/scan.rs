@@ -339,6 +339,10 @@ mod tests {
                 for (row, span) in (row..).zip(Edges::new(outline).spans(row, 1000)) {
                     let below = i128::from((i64::from(row) << GRID_BITS) + ONE / 2 - upper.y);
                     let line = upper.x + (i128::from(dx) * below / i128::from(dy)) as i64;
+                    if (line - ONE / 2 + 2) & (ONE - 1) < 4 {
+                        // Too close to a centre for the rounding of this line.
+                        continue;
+                    }
                     let expected = ((line + ONE / 2 - 1) >> GRID_BITS).max(0);
                     assert_eq!(span.columns().start as i64, expected, "shift {shift}, row {row}");
                 }
