@@ -12,6 +12,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use super::reader::{Parsed, Reader};
 
 /// Bytes of meshes that are parsed and not yet taken; beyond it nothing more is parsed ahead.
+#[cfg(feature = "threads")]
 const MOST_BYTES: usize = 64 << 20;
 
 /// What parsing gave, or what it panicked with.
@@ -43,6 +44,7 @@ struct State {
     /// Of the meshes in `parsed`.
     bytes: usize,
     /// A worker is at it, or will be.
+    #[cfg(feature = "threads")]
     has_worker: bool,
 }
 
@@ -55,6 +57,7 @@ impl State {
         Some((self.reader.take()?, self.waiting.pop_front()?))
     }
 
+    #[cfg(feature = "threads")]
     fn is_full(&self) -> bool {
         self.bytes >= MOST_BYTES
     }
@@ -107,6 +110,7 @@ impl Ahead {
             waiting: VecDeque::new(),
             parsed: VecDeque::new(),
             bytes: 0,
+            #[cfg(feature = "threads")]
             has_worker: false,
         };
         Self { shared: Arc::new(Shared { state: Mutex::new(state), parsed: Condvar::new() }) }
