@@ -14,7 +14,7 @@ use glam::{Vec3A, Vec4};
 
 use super::canvas::{Canvas, ColorSpace};
 use super::coverage::Coverage;
-use super::grid::{GRID_BITS, GridPoint, touched};
+use super::grid::{GRID_BITS, GridPoint};
 use super::pack::BAND_ROWS;
 use super::scan::Outline;
 use super::shade::Shade;
@@ -103,15 +103,12 @@ impl Crossed {
         }
     }
 
-    /// Adds what a polygon with these colours at its corners, in the channels of the canvas, covers of the pixels;
-    /// `corners` are those of the outline.
-    pub(super) fn add(&mut self, outline: &Outline, corners: &[GridPoint], colors: &[Vec4; 4], space: ColorSpace) {
+    /// Adds what a polygon of `count` corners, with these colours in the channels of the canvas, covers of the pixels.
+    pub(super) fn add(&mut self, outline: &Outline, count: u8, colors: &[Vec4; 4], space: ColorSpace) {
         if self.sums.is_empty() {
             return;
         }
-        let Some((columns, rows)) = touched(corners, self.columns.len() as i32, self.rows.clone()) else {
-            return;
-        };
+        let Some((columns, rows)) = outline.hull().touched(self.columns.len() as i32, &self.rows) else { return };
         let from_first = Rows::MAX << (rows.start - self.rows.start);
         let within = from_first & Rows::MAX >> (self.rows.start + Rows::BITS as i32 - rows.end);
         let tiles = columns.start as usize / TILE..=(columns.end as usize - 1) / TILE;
@@ -120,7 +117,8 @@ impl Crossed {
             return;
         }
         let shade = Shade::new(outline, colors, space);
-        let coverage = Coverage::new(corners, [columns.start, rows.start]);
+        let corners = outline.corners();
+        let coverage = Coverage::new(&corners[..count.into()], [columns.start, rows.start]);
         for tile in tiles {
             let in_tile = (tile * TILE) as i32..((tile + 1) * TILE) as i32;
             for column in columns.start.max(in_tile.start)..columns.end.min(in_tile.end) {

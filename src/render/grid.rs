@@ -2,8 +2,6 @@
 //!
 //! In: places in pixels. Out: multiples of 2^-[`GRID_BITS`] px. Forbidden here: which pixels a polygon covers.
 
-use std::ops::Range;
-
 use glam::DVec2;
 
 /// Binary digits of the grid after the point: 2^-20 px. Snapping may turn over a triangle thinner than that; it is then
@@ -81,28 +79,4 @@ pub(super) fn turn([a, b, c]: [GridPoint; 3]) -> i64 {
 fn wide_turn(u: [i64; 2], v: [i64; 2]) -> i128 {
     let ([ux, uy], [vx, vy]) = (u.map(i128::from), v.map(i128::from));
     ux * vy - uy * vx
-}
-
-/// Columns (below `columns`) and rows (among `rows`) of pixels that the polygon's bounds touch; `None` if there are
-/// none.
-#[inline]
-pub(super) fn touched(corners: &[GridPoint], columns: i32, rows: Range<i32>) -> Option<(Range<i32>, Range<i32>)> {
-    let (low, high) = hull(corners);
-    let cut = |low: i64, high: i64, pixels: Range<i32>| {
-        let first = (low >> GRID_BITS).max(pixels.start.into());
-        let end = (-(-high >> GRID_BITS)).min(pixels.end.into());
-        (first < end).then_some(first as i32..end as i32)
-    };
-    cut(low.x, high.x, 0..columns).zip(cut(low.y, high.y, rows))
-}
-
-/// The least and the greatest coordinates; `corners` are not empty.
-#[inline]
-pub(super) fn hull(corners: &[GridPoint]) -> (GridPoint, GridPoint) {
-    let (mut low, mut high) = (corners[0], corners[0]);
-    for corner in &corners[1..] {
-        low = GridPoint { x: low.x.min(corner.x), y: low.y.min(corner.y) };
-        high = GridPoint { x: high.x.max(corner.x), y: high.y.max(corner.y) };
-    }
-    (low, high)
 }

@@ -94,8 +94,7 @@ impl Painter {
             let edges = patches.clone().map(|patch| (&patch.outline, patch.count, patch.boundary));
             crossed.start(picture.view, rows.clone(), edges);
             for patch in patches {
-                let corners = patch.outline.corners();
-                crossed.add(&patch.outline, &corners[..patch.count.into()], &patch.colors, space);
+                crossed.add(&patch.outline, patch.count, &patch.colors, space);
             }
             crossed.paint(canvas);
         }

@@ -91,6 +91,16 @@ impl Hull {
         Self::cut(f64x2::new([column, row]), self.high, size)
     }
 
+    /// Columns (below `columns`) and rows (among `rows`) of the pixels that it touches; `None` if there are none.
+    #[inline]
+    pub(super) fn touched(&self, columns: i32, rows: &Range<i32>) -> Option<(Range<i32>, Range<i32>)> {
+        let [left, top, right, bottom] = ceil(join(-self.low, self.high)).to_array();
+        let (left, right) = ((-left).max(0.0), right.min(columns.into()));
+        let (top, bottom) = ((-top).max(rows.start.into()), bottom.min(rows.end.into()));
+        let is_seen = left < right && top < bottom;
+        is_seen.then(|| (whole(left)..whole(right), whole(top)..whole(bottom)))
+    }
+
     /// What of columns and rows, rounded up, lies on the surface.
     #[inline(always)]
     fn cut(first: f64x2, end: f64x2, [columns, rows]: [i32; 2]) -> Option<Seen> {
