@@ -1,12 +1,23 @@
 //! The decoder's door: packets in, pictures out.
 //!
+//! ```text
+//! packets -> ahead: reader -> growth -> slab -> pictures
+//! ```
+//!
 //! Forbidden here: files, clocks; the decoder also runs where there are none.
+
+mod ahead;
+mod reader;
+mod slab;
 
 use thiserror::Error;
 
-use crate::bitstream::{Limits, PacketHeader, ParseError, SequenceHeader, SlabParser};
+use self::ahead::Ahead;
+use self::reader::{Brought, Parsed};
+use self::slab::Slab;
+use crate::bitstream::{ParseError, SequenceHeader};
 pub use crate::render::Viewport;
-use crate::render::{DrawParams, Scene, ViewportError};
+use crate::render::ViewportError;
 use crate::video::Surface;
 
 /// How a [`Decoder`] works.
@@ -58,15 +69,22 @@ impl From<ParseError> for DecodeError {
 }
 
 /// Decodes packets of one stream and draws pictures at any size and time.
+///
+/// Packets are decoded where they are sent ([`Self::send_packet`]), or ahead: queued ([`Self::queue_packet`]), they are
+/// decoded by threads that have nothing else to do, also while pictures are drawn, and taken one by one
+/// ([`Self::receive_packet`]).
 #[derive(Debug)]
 pub struct Decoder {
     config: DecoderConfig,
-    parser: SlabParser,
-    /// What of the parser's slab can be drawn.
+    ahead: Ahead,
+    header: Option<SequenceHeader>,
+    /// What can be drawn.
     slab: Option<Slab>,
+    /// What could be drawn before a flush, in case that its packets come again.
+    flushed: Option<Slab>,
     /// Threads of our own; `None`: those of whoever calls.
     #[cfg(feature = "threads")]
-    pool: Option<rayon::ThreadPool>,
+    pool: ahead::Pool,
 }
 
 /// Which picture to draw.
@@ -81,18 +99,6 @@ pub struct RenderParams {
     pub mesh: bool,
 }
 
-/// The slab that is drawn.
-#[derive(Debug)]
-struct Slab {
-    scene: Scene,
-    /// Whether the mesh has grown since the scene took it in: packets on the way to a picture cost no more than parsing.
-    is_behind: bool,
-    /// Number of its first frame, counted from the start of the stream.
-    first_frame: u64,
-    /// The last time to draw, in frames since the slab's first: beyond it the mesh has not come yet.
-    last_frame: f64,
-}
-
 impl Decoder {
     /// A decoder that waits for a keyframe.
     pub fn new(config: DecoderConfig) -> Self {
@@ -100,52 +106,84 @@ impl Decoder {
             #[cfg(feature = "threads")]
             pool: thread_pool(config.threads),
             config,
-            parser: SlabParser::new(Limits::default()),
+            ahead: Ahead::new(),
+            header: None,
             slab: None,
+            flushed: None,
         }
     }
 
     /// The header of the last keyframe decoded.
     pub fn header(&self) -> Option<&SequenceHeader> {
-        self.parser.header()
+        self.header.as_ref()
     }
 
     /// Decodes one packet. After an error every packet is refused with [`DecodeError::NoKeyframe`] until the next
-    /// keyframe; pictures of what was decoded before can still be drawn.
+    /// keyframe; pictures of what was decoded before can still be drawn. Packets that are queued are decoded and taken
+    /// before, and their errors passed over.
     ///
     /// # Errors
     /// Damaged, missing or oversized data.
     pub fn send_packet(&mut self, data: &[u8]) -> Result<PacketInfo, DecodeError> {
-        let parsed = self.parser.parse_packet(data);
-        self.take_packet(parsed)
+        self.take_queued();
+        let parsed = self.ahead.parse_now(data);
+        self.take(parsed)
     }
 
-    fn take_packet(&mut self, parsed: Result<PacketHeader, ParseError>) -> Result<PacketInfo, DecodeError> {
-        let packet = parsed?;
-        if packet.picture {
-            self.take_mesh(packet.keyframe);
+    /// Queues a packet to be decoded behind those already queued, by the next thread that is free. What can be drawn
+    /// stays as it is until the packet is taken with [`Self::receive_packet`].
+    ///
+    /// The queue has no end: how far ahead packets are queued is the caller's choice. Few are enough: a keyframe takes
+    /// as long to decode as about ten others. Meshes of up to 64 MB (and one packet more) are decoded ahead.
+    pub fn queue_packet(&mut self, data: Vec<u8>) {
+        self.ahead.push(data);
+        #[cfg(feature = "threads")]
+        self.ahead.hurry(&self.pool);
+    }
+
+    /// Takes the oldest packet queued, once it is decoded: from then on its pictures can be drawn. `None` if none is
+    /// queued.
+    ///
+    /// # Errors
+    /// As of [`Self::send_packet`].
+    pub fn receive_packet(&mut self) -> Option<Result<PacketInfo, DecodeError>> {
+        let parsed = self.ahead.next()?;
+        #[cfg(feature = "threads")]
+        self.ahead.hurry(&self.pool);
+        Some(self.take(parsed))
+    }
+
+    fn take_queued(&mut self) {
+        while let Some(parsed) = self.ahead.next() {
+            // Whoever wants to know receives it.
+            let _ = self.take(parsed);
         }
+    }
+
+    /// Notes what a packet brought.
+    fn take(&mut self, Parsed { packet, brought }: Parsed) -> Result<PacketInfo, DecodeError> {
+        let packet = packet?;
+        match brought {
+            Some(Brought::Growth(growth)) => {
+                self.flushed = None;
+                if growth.is_whole {
+                    self.slab = None;
+                }
+                let slab = || Slab::new(growth.header, growth.first_frame, growth.tail.domain);
+                self.slab.get_or_insert_with(slab).grow(growth);
+            }
+            Some(Brought::Again(progress)) => {
+                if self.slab.is_none() {
+                    self.slab = self.flushed.take();
+                }
+                if let Some(slab) = &mut self.slab {
+                    slab.come_to(progress);
+                }
+            }
+            None => (),
+        }
+        self.header = self.slab.as_ref().map(Slab::header);
         Ok(PacketInfo { frame_number: packet.frame_number, keyframe: packet.keyframe, picture: packet.picture })
-    }
-
-    /// Notes what the last packet brought.
-    fn take_mesh(&mut self, keyframe: bool) {
-        let (Some(mesh), Some(first_frame)) = (self.parser.mesh(), self.parser.first_frame()) else { return };
-        if keyframe {
-            self.slab = None;
-        }
-        let slab = self.slab.get_or_insert_with(|| Slab {
-            scene: Scene::new(mesh.domain),
-            is_behind: true,
-            first_frame,
-            last_frame: 0.0,
-        });
-        slab.is_behind = true;
-        slab.last_frame = if self.parser.is_ended() {
-            f64::from(mesh.domain.duration)
-        } else {
-            f64::from(self.parser.frames_complete()) - slab.scene.time_step()
-        };
     }
 
     /// Draws the picture at time `frame` (as of [`RenderParams::frame`]). `viewport` `None`: the whole picture.
@@ -166,12 +204,13 @@ impl Decoder {
     /// # Errors
     /// Nothing decoded yet, or an unusable viewport.
     pub fn render_with(&mut self, params: &RenderParams, surface: &mut Surface<'_>) -> Result<(), DecodeError> {
-        let (slab, params) = drawing(&self.config, &self.parser, &mut self.slab, params)?;
+        let slab = self.slab.as_mut().ok_or(DecodeError::NoKeyframe)?;
+        let at = slab.prepare(&self.config, params);
         #[cfg(feature = "threads")]
         if let Some(pool) = &self.pool {
-            return pool.install(|| slab.draw(&params, surface));
+            return pool.install(|| slab.draw(&at, surface));
         }
-        slab.draw(&params, surface)
+        slab.draw(&at, surface)
     }
 
     /// [`Self::render_with`], and at the same time, on another thread where there is one, [`Self::send_packet`] with the
@@ -184,10 +223,13 @@ impl Decoder {
         surface: &mut Surface<'_>,
         data: &[u8],
     ) -> (Result<(), DecodeError>, Result<PacketInfo, DecodeError>) {
-        let (drawn, parsed) = match drawing(&self.config, &self.parser, &mut self.slab, params) {
-            Err(error) => (Err(error), self.parser.parse_packet(data)),
-            Ok((slab, params)) => {
-                let (draw, parse) = (|| slab.draw(&params, surface), || self.parser.parse_packet(data));
+        self.take_queued();
+        let parse = || self.ahead.parse_now(data);
+        let (drawn, parsed) = match &mut self.slab {
+            None => (Err(DecodeError::NoKeyframe), parse()),
+            Some(slab) => {
+                let at = slab.prepare(&self.config, params);
+                let draw = || slab.draw(&at, surface);
                 #[cfg(feature = "threads")]
                 let both = match &self.pool {
                     Some(pool) => pool.install(|| rayon::join(draw, parse)),
@@ -198,49 +240,19 @@ impl Decoder {
                 both
             }
         };
-        (drawn, self.take_packet(parsed))
+        (drawn, self.take(parsed))
     }
 
-    /// Forgets everything and waits for a keyframe.
+    /// Forgets what can be drawn and packets that are queued, and waits for a keyframe, and for a packet that is being
+    /// decoded. If the keyframe is the one before the flush again, it and the packets behind it that were decoded before
+    /// cost nothing: a seek back costs as much as drawing.
     pub fn flush(&mut self) {
-        self.parser.flush();
-        self.slab = None;
-    }
-}
-
-/// What is drawn of which slab; its scene is brought up to the mesh.
-fn drawing<'a>(
-    config: &DecoderConfig,
-    parser: &SlabParser,
-    slab: &'a mut Option<Slab>,
-    params: &RenderParams,
-) -> Result<(&'a mut Slab, DrawingAt), DecodeError> {
-    let (Some(slab), Some(header), Some(mesh)) = (slab, parser.header(), parser.mesh()) else {
-        return Err(DecodeError::NoKeyframe);
-    };
-    if std::mem::take(&mut slab.is_behind) {
-        slab.scene.extend(mesh);
-    }
-    let levels = match (header.subdivision_levels, config.subdivision_levels) {
-        // Its packets do not bring the stars that masks need.
-        (0, _) => 0,
-        (of_stream, wanted) => wanted.unwrap_or(of_stream).min(MAX_LEVELS),
-    };
-    let frame = (params.frame - slab.first_frame as f64).min(slab.last_frame);
-    let RenderParams { viewport, mesh, .. } = *params;
-    Ok((slab, DrawingAt { frame, params: DrawParams { levels, antialias: config.antialias, viewport, mesh } }))
-}
-
-/// A picture of a slab.
-struct DrawingAt {
-    /// Frames since the slab's first.
-    frame: f64,
-    params: DrawParams,
-}
-
-impl Slab {
-    fn draw(&mut self, at: &DrawingAt, surface: &mut Surface<'_>) -> Result<(), DecodeError> {
-        Ok(self.scene.draw(at.frame, &at.params, surface)?)
+        for parsed in self.ahead.flush() {
+            // What it brought is part of what is flushed.
+            let _ = self.take(parsed);
+        }
+        self.header = None;
+        self.flushed = self.slab.take().or(self.flushed.take());
     }
 }
 
@@ -249,12 +261,9 @@ fn one_by_one<A, B>(first: impl FnOnce() -> A, second: impl FnOnce() -> B) -> (A
     (first(), second())
 }
 
-/// Deepest subdivision drawn, as in the stream's header.
-const MAX_LEVELS: u8 = 2;
-
 /// A pool of so many threads; with 0, or where none can be made, the global one, which has a thread a core.
 #[cfg(feature = "threads")]
-fn thread_pool(threads: usize) -> Option<rayon::ThreadPool> {
+fn thread_pool(threads: usize) -> ahead::Pool {
     if threads == 0 {
         return None;
     }

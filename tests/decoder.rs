@@ -10,8 +10,8 @@ use tetvec::bitstream::{Fraction, SequenceHeader, SlabWriter};
 use tetvec::mesh::{Domain, TetMesh};
 use tetvec::render::DrawParams;
 use tetvec::{
-    DecodeError, Decoder, DecoderConfig, Packet, PixelFormat, Plane, RenderParams, SequenceHeader as Header, Surface,
-    Viewport, YuvMatrix,
+    DecodeError, Decoder, DecoderConfig, Packet, PacketInfo, PixelFormat, Plane, RenderParams,
+    SequenceHeader as Header, Surface, Viewport, YuvMatrix,
 };
 
 const SIZE: (u32, u32) = (97, 71);
@@ -90,6 +90,135 @@ fn drawing_and_decoding_at_once_is_one_after_the_other() {
         assert_eq!(turns.send_packet(&next.data), sent, "packet {k}");
         assert_eq!(sent.is_ok(), k < damaged, "packet {k}");
     }
+}
+
+/// What became of a packet, and the picture right after it.
+type Shown = (Result<PacketInfo, DecodeError>, Result<Vec<u8>, DecodeError>);
+
+/// What a decoder makes of packets that are sent one by one.
+fn play_in_turns(decoder: &mut Decoder, packets: &[Packet]) -> Vec<Shown> {
+    let mut shown = |k: usize| (decoder.send_packet(&packets[k].data), picture(decoder, k as f64));
+    (0..packets.len()).map(&mut shown).collect()
+}
+
+/// What a decoder makes of packets that are queued so many ahead.
+fn play_ahead(decoder: &mut Decoder, packets: &[Packet], ahead: usize) -> Vec<Shown> {
+    let mut shown = Vec::new();
+    let mut queued = 0;
+    for k in 0..packets.len() {
+        while queued < packets.len().min(k + 1 + ahead) {
+            decoder.queue_packet(packets[queued].data.clone());
+            queued += 1;
+        }
+        shown.push((decoder.receive_packet().expect("a packet is queued"), picture(decoder, k as f64)));
+    }
+    assert_eq!(decoder.receive_packet(), None);
+    shown
+}
+
+/// However far packets are read ahead, each brings the same and pictures are the same: over keyframes, damage, and with
+/// any number of threads.
+#[test]
+fn reading_ahead_changes_nothing() {
+    let (mut packets, _) = slab(0, 3);
+    packets.extend(slab(u64::from(FRAMES), 4).0);
+    packets.extend(slab(2 * u64::from(FRAMES), 5).0);
+    let damaged = FRAMES as usize + 4;
+    let last = packets[damaged].data.len() - 1;
+    packets[damaged].data[last] ^= 1;
+    let expected = play_in_turns(&mut decoder(1), &packets);
+    assert_eq!(expected[damaged + 1].0, Err(DecodeError::NoKeyframe));
+    assert_eq!(expected.iter().filter(|(result, _)| result.is_ok()).count(), 2 * FRAMES as usize + 4);
+    assert!(expected.iter().all(|(_, picture)| picture.is_ok()));
+    for threads in [0, 1, 3] {
+        for ahead in [0, 1, 5, packets.len()] {
+            let config = DecoderConfig { subdivision_levels: Some(1), threads, ..DecoderConfig::default() };
+            let found = play_ahead(&mut Decoder::new(config), &packets, ahead);
+            assert!(found == expected, "{threads} threads, {ahead} packets ahead");
+        }
+    }
+}
+
+/// Packets that are queued, or being decoded, are gone with a flush; the next keyframe starts anew.
+#[test]
+fn a_flush_forgets_what_is_queued() {
+    let (packets, _) = slab(0, 3);
+    let expected = play_in_turns(&mut decoder(0), &packets);
+    let mut decoder = decoder(0);
+    for taken in [0, 1, 3] {
+        packets.iter().for_each(|packet| decoder.queue_packet(packet.data.clone()));
+        for _ in 0..taken {
+            decoder.receive_packet().expect("a packet is queued").expect("a good packet");
+        }
+        decoder.flush();
+        assert_eq!(decoder.receive_packet(), None);
+        assert_eq!(picture(&mut decoder, 0.0), Err(DecodeError::NoKeyframe));
+        assert_eq!(decoder.send_packet(&packets[3].data), Err(DecodeError::NoKeyframe));
+        assert!(play_ahead(&mut decoder, &packets, 4) == expected);
+    }
+}
+
+/// Packets that come again after a flush bring what they brought at first, wherever the flush came, and so does what is
+/// new behind them.
+#[test]
+fn packets_that_come_again_bring_the_same() {
+    let (first, _) = slab(0, 3);
+    let (second, _) = slab(u64::from(FRAMES), 4);
+    let whole = [&first[..], &second[..]].concat();
+    for levels in [0, 1] {
+        let expected = play_in_turns(&mut decoder(levels), &whole);
+        let mut decoder = decoder(levels);
+        for (played, ahead) in [(1, 0), (5, 0), (3, 4), (9, 0), (9, 1), (12, 3), (18, 0)] {
+            assert!(play_ahead(&mut decoder, &whole, ahead) == expected, "level {levels}");
+            decoder.flush();
+            assert!(play_ahead(&mut decoder, &whole[..played], ahead) == expected[..played], "{played} packets");
+            whole[played..].iter().take(ahead).for_each(|packet| decoder.queue_packet(packet.data.clone()));
+            decoder.flush();
+        }
+    }
+}
+
+/// What else comes after a flush, or between packets that come again, is judged as by a new decoder.
+#[test]
+fn what_comes_instead_of_known_packets_is_judged_by_itself() {
+    let (known, _) = slab(0, 3);
+    let (other, _) = slab(0, 4);
+    let damaged = |k: usize| {
+        let mut packet = known[k].clone();
+        let last = packet.data.len() - 1;
+        packet.data[last] ^= 1;
+        packet
+    };
+    let sequences = [
+        other.clone(),
+        vec![known[0].clone(), known[1].clone(), known[3].clone(), known[4].clone(), known[0].clone()],
+        vec![known[0].clone(), damaged(1), known[2].clone(), other[0].clone(), known[1].clone()],
+        vec![damaged(0), known[1].clone(), known[0].clone(), known[1].clone()],
+        vec![known[2].clone(), known[3].clone(), other[0].clone(), other[1].clone()],
+        vec![known[0].clone(), other[1].clone(), other[2].clone(), known[0].clone()],
+        vec![known[0].clone(), known[1].clone(), other[0].clone(), other[1].clone(), known[2].clone()],
+    ];
+    for (number, sequence) in sequences.iter().enumerate() {
+        let expected = play_in_turns(&mut decoder(0), sequence);
+        let mut decoder = decoder(0);
+        play_in_turns(&mut decoder, &known);
+        decoder.flush();
+        assert!(play_in_turns(&mut decoder, sequence) == expected, "sequence {number}");
+    }
+}
+
+/// A packet that is sent comes behind those queued.
+#[test]
+fn sending_takes_what_is_queued_before() {
+    let (packets, _) = slab(0, 3);
+    let (mut queued, mut sent) = (decoder(0), decoder(0));
+    packets[..3].iter().for_each(|packet| queued.queue_packet(packet.data.clone()));
+    for packet in &packets[..3] {
+        sent.send_packet(&packet.data).expect("a good packet");
+    }
+    assert_eq!(queued.send_packet(&packets[3].data), sent.send_packet(&packets[3].data));
+    assert_eq!(queued.receive_packet(), None);
+    assert!(picture(&mut queued, 3.5) == picture(&mut sent, 3.5));
 }
 
 #[test]

@@ -16,5 +16,5 @@ pub use domain::{Domain, Sides};
 pub(crate) use face_map::FaceMap;
 pub use ids::{VertexId, WedgeId};
 pub use predicates::volume6;
-pub use tet_mesh::{TetMesh, Wedge};
+pub use tet_mesh::{MeshCounts, MeshTail, TetMesh, Wedge};
 pub use validate::{MeshError, validate};

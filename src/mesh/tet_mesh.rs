@@ -35,10 +35,65 @@ pub struct TetMesh {
     pub tets: Vec<[WedgeId; 4]>,
 }
 
+/// Lengths of a mesh's arrays, as far as somebody knows them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct MeshCounts {
+    /// Of positions and pins.
+    pub vertices: usize,
+    /// Of wedges.
+    pub wedges: usize,
+    /// Of tets.
+    pub tets: usize,
+}
+
+/// The ends of a mesh's arrays. Ids in it count from the mesh's beginning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeshTail<'a> {
+    /// The box and the lattice of positions of the whole mesh.
+    pub domain: Domain,
+    /// As of [`TetMesh::positions`].
+    pub positions: &'a [IVec3],
+    /// As of [`TetMesh::pinned`].
+    pub pinned: &'a [bool],
+    /// As of [`TetMesh::wedges`].
+    pub wedges: &'a [Wedge],
+    /// As of [`TetMesh::tets`].
+    pub tets: &'a [[WedgeId; 4]],
+}
+
+impl MeshTail<'_> {
+    /// A copy, in the arrays of a mesh that has nothing before them.
+    pub fn to_mesh(&self) -> TetMesh {
+        TetMesh {
+            domain: self.domain,
+            positions: self.positions.to_vec(),
+            pinned: self.pinned.to_vec(),
+            wedges: self.wedges.to_vec(),
+            tets: self.tets.to_vec(),
+        }
+    }
+}
+
 impl TetMesh {
     /// A mesh without vertices.
     pub fn empty(domain: Domain) -> Self {
         Self { domain, positions: Vec::new(), pinned: Vec::new(), wedges: Vec::new(), tets: Vec::new() }
+    }
+
+    /// Lengths of the arrays.
+    pub fn counts(&self) -> MeshCounts {
+        MeshCounts { vertices: self.positions.len(), wedges: self.wedges.len(), tets: self.tets.len() }
+    }
+
+    /// What is beyond `known`, which is at most [`Self::counts`].
+    pub fn tail(&self, known: MeshCounts) -> MeshTail<'_> {
+        MeshTail {
+            domain: self.domain,
+            positions: &self.positions[known.vertices..],
+            pinned: &self.pinned[known.vertices..],
+            wedges: &self.wedges[known.wedges..],
+            tets: &self.tets[known.tets..],
+        }
     }
 
     /// Appends a vertex.

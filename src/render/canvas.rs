@@ -1,14 +1,30 @@
-//! The pixels of a band of rows on their way to a surface: three planes of bytes, in the channels of the surface.
+//! The pixels of a band of rows on their way to a surface: four bytes each, in the channels of the surface.
 //!
-//! In: runs of pixels that a [`Run`](super::shade::Run) fills in, single colours. Out: rows of each channel. Where the
-//! surface is Y'CbCr so is the canvas: colours are converted at the corners of polygons, not at pixels.
+//! In: runs of pixels that a [`Run`](super::run::Run) fills in, single colours. Out: rows of pixels. Where the surface is
+//! Y'CbCr so is the canvas: colours are converted at the corners of polygons, not at pixels. Channels lie side by side, as
+//! most runs are a few pixels long: all that is written of one is in one place.
 
-use glam::Vec3A;
+use glam::{Vec3A, Vec4};
 
 use crate::video::{PixelFormat, YuvMatrix, rgb_to_yuv};
 
 /// Pixels that are written at a time. Rows have as much room beyond their end.
-pub(super) const CHUNK: usize = 16;
+pub(super) const CHUNK: usize = 4;
+
+/// The second channel, the first, the third, and a byte of no meaning: so both kinds of chroma have room for sums.
+pub(super) type Pixel = [u8; 4];
+
+/// A pixel of these channels.
+#[inline]
+pub(super) fn pixel([first, second, third]: [u8; 3]) -> Pixel {
+    [second, first, third, 0]
+}
+
+/// The channels of a pixel.
+#[inline]
+pub(super) fn channels([second, first, third, _]: Pixel) -> [u8; 3] {
+    [first, second, third]
+}
 
 /// What a canvas's three channels are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +42,35 @@ impl ColorSpace {
             PixelFormat::Rgb | PixelFormat::Rgbx | PixelFormat::Bgrx => Self::Rgb,
             PixelFormat::I420 | PixelFormat::Nv12 => Self::Yuv(matrix),
         }
+    }
+
+    /// The channels of a colour given in RGB levels, in the order of a [`Pixel`].
+    #[inline]
+    pub(super) fn of_rgb(self, rgb: Vec3A) -> Vec4 {
+        let [first, second, third] = match self {
+            Self::Rgb => rgb.to_array(),
+            Self::Yuv(matrix) => matrix.of_levels(rgb).to_array(),
+        };
+        Vec4::new(second, first, third, 0.0)
+    }
+
+    /// RGB levels of channels in the order of a [`Pixel`].
+    pub(super) fn to_rgb(self, channels: Vec4) -> Vec3A {
+        let channels = Vec3A::new(channels.y, channels.x, channels.z);
+        match self {
+            Self::Rgb => channels,
+            Self::Yuv(matrix) => matrix.to_levels(channels),
+        }
+    }
+
+    /// Whether a colour given in RGB levels may be painted chunk by chunk: within the range of a chunk and, where clamping
+    /// and conversion could change places, in no need of clamping.
+    pub(super) fn holds(self, rgb: Vec3A) -> bool {
+        let (low, high) = match self {
+            Self::Rgb => (-254.0, 509.0),
+            Self::Yuv(_) => (0.0, 255.0),
+        };
+        rgb.cmpge(Vec3A::splat(low)).all() && rgb.cmple(Vec3A::splat(high)).all()
     }
 
     /// Rounds and clamps a colour given in RGB levels.
@@ -50,70 +95,72 @@ impl ColorSpace {
 pub(super) struct Canvas {
     space: ColorSpace,
     width: usize,
-    /// Bytes of a channel's row.
-    stride: usize,
-    /// Row by row, the three channels of each one after the other.
-    bytes: Vec<u8>,
+    /// Row by row, each with [`CHUNK`] pixels more.
+    pixels: Vec<Pixel>,
 }
 
 impl Canvas {
     /// A canvas without rows.
     pub(super) fn new() -> Self {
-        Self { space: ColorSpace::Rgb, width: 0, stride: 0, bytes: Vec::new() }
+        Self { space: ColorSpace::Rgb, width: 0, pixels: Vec::new() }
     }
 
     /// Starts anew, all black.
     pub(super) fn start(&mut self, space: ColorSpace, width: usize, rows: usize) {
-        (self.space, self.width, self.stride) = (space, width, width + CHUNK);
-        self.bytes.clear();
-        match space {
-            ColorSpace::Rgb => self.bytes.resize(3 * self.stride * rows, 0),
-            ColorSpace::Yuv(_) => {
-                self.bytes.resize(3 * self.stride * rows, 128);
-                for row in self.bytes.chunks_exact_mut(3 * self.stride) {
-                    row[..self.stride].fill(16);
-                }
-            }
-        }
+        (self.space, self.width) = (space, width);
+        let black = match space {
+            ColorSpace::Rgb => pixel([0; 3]),
+            ColorSpace::Yuv(_) => pixel([16, 128, 128]),
+        };
+        self.pixels.clear();
+        self.pixels.resize((width + CHUNK) * rows, black);
     }
 
-    /// Channels of a row; [`CHUNK`] bytes more than the row is long.
+    /// The pixels of a row, and [`CHUNK`] more.
     #[inline]
-    pub(super) fn row_mut(&mut self, row: usize) -> [&mut [u8]; 3] {
-        let channels = &mut self.bytes[3 * self.stride * row..][..3 * self.stride];
-        let (first, others) = channels.split_at_mut(self.stride);
-        let (second, third) = others.split_at_mut(self.stride);
-        [first, second, third]
+    pub(super) fn row_mut(&mut self, row: usize) -> &mut [Pixel] {
+        let stride = self.width + CHUNK;
+        &mut self.pixels[stride * row..][..stride]
     }
 
-    /// A channel of a row.
+    /// The pixels of each row from `row` on, and [`CHUNK`] more of each.
     #[inline]
-    pub(super) fn row(&self, row: usize, channel: usize) -> &[u8] {
-        &self.bytes[self.stride * (3 * row + channel)..][..self.width]
+    pub(super) fn rows_mut(&mut self, row: usize) -> impl Iterator<Item = &mut [Pixel]> {
+        let stride = self.width + CHUNK;
+        self.pixels[stride * row..].chunks_exact_mut(stride)
+    }
+
+    /// Pixels of a row.
+    #[inline]
+    pub(super) fn width(&self) -> usize {
+        self.width
+    }
+
+    /// The pixels of a row.
+    #[inline]
+    pub(super) fn row(&self, row: usize) -> &[Pixel] {
+        &self.pixels[(self.width + CHUNK) * row..][..self.width]
     }
 
     /// Paints one pixel in a colour given in RGB levels.
     #[inline]
     pub(super) fn set(&mut self, column: usize, row: usize, color: Vec3A) {
         let packed = self.space.pack(color);
-        for (channel, value) in self.row_mut(row).into_iter().zip(packed) {
-            channel[column] = value;
-        }
+        self.row_mut(row)[column] = pixel(packed);
     }
 
     /// Makes one pixel stand out: halfway to white where it is dark, to black where it is light.
     pub(super) fn set_apart(&mut self, column: usize, row: usize) {
         let space = self.space;
-        let [first, second, third] = self.row_mut(row);
+        let place = &mut self.row_mut(row)[column];
+        let before = channels(*place);
         // Green stands for how light a colour is, as luma mostly does.
         let other = match space {
-            ColorSpace::Rgb if second[column] < 128 => [255; 3],
+            ColorSpace::Rgb if before[1] < 128 => [255; 3],
             ColorSpace::Rgb => [0; 3],
-            ColorSpace::Yuv(_) if first[column] < 126 => [235, 128, 128],
+            ColorSpace::Yuv(_) if before[0] < 126 => [235, 128, 128],
             ColorSpace::Yuv(_) => [16, 128, 128],
         };
-        for (channel, other) in [first, second, third].into_iter().zip(other) {
-            channel[column] = channel[column].midpoint(other);
-        }
+        *place = pixel(std::array::from_fn(|channel| before[channel].midpoint(other[channel])));
     }
 }

@@ -4,7 +4,7 @@
 
 use glam::IVec3;
 
-use crate::mesh::{Sides, TetMesh};
+use crate::mesh::{MeshCounts, MeshTail, Sides, TetMesh};
 use crate::video::Label;
 
 /// Binary digits that refined positions have beyond those of the control mesh: masks divide, and what they give is
@@ -35,6 +35,8 @@ pub(super) struct Complex {
     pub(super) nodes: Vec<Node>,
     /// Tets over nodes, positively oriented at level 0.
     pub(super) tets: Vec<[u32; 4]>,
+    /// The box's end in time in fine units, as of the last tail; `None` before the first, and from level 1 on.
+    top: Option<i32>,
 }
 
 impl Complex {
@@ -46,24 +48,34 @@ impl Complex {
     }
 
     /// Takes in what `mesh` gained at the ends of its arrays since the last call, and the present state of pins.
-    /// Returns the points that changed sides, as they do when a slab's duration becomes known after its vertices.
+    /// Returns the points that changed sides.
     pub(super) fn extend(&mut self, mesh: &TetMesh) -> Vec<u32> {
+        let (vertices, wedges, tets) = (self.points.len(), self.nodes.len(), self.tets.len());
+        let moved = self.append(&mesh.tail(MeshCounts { vertices, wedges, tets }));
+        self.pinned.clone_from(&mesh.pinned);
+        moved
+    }
+
+    /// Appends what a mesh gained. Returns the points that changed sides, as they do when a slab's duration becomes known
+    /// after its vertices.
+    pub(super) fn append(&mut self, tail: &MeshTail<'_>) -> Vec<u32> {
+        let top = tail.domain.extent().z << FINE_BITS;
         let mut moved = Vec::new();
-        for (point, (sides, &position)) in self.sides.iter_mut().zip(&mesh.positions).enumerate() {
-            let now = mesh.domain.sides(position);
-            if std::mem::replace(sides, now) != now {
-                moved.push(point as u32);
+        if let Some(before) = self.top.replace(top).filter(|&before| before != top) {
+            for (point, position) in self.points.iter().enumerate().filter(|(_, p)| p.z == before || p.z == top) {
+                let now = tail.domain.sides(*position >> FINE_BITS as i32);
+                if std::mem::replace(&mut self.sides[point], now) != now {
+                    moved.push(point as u32);
+                }
             }
         }
-        for &position in &mesh.positions[self.points.len()..] {
+        for &position in tail.positions {
             self.points.push(position << FINE_BITS as i32);
-            self.sides.push(mesh.domain.sides(position));
+            self.sides.push(tail.domain.sides(position));
         }
-        self.pinned.clone_from(&mesh.pinned);
-        let nodes = mesh.wedges[self.nodes.len()..].iter();
-        self.nodes.extend(nodes.map(|wedge| Node { point: wedge.vertex.0, label: wedge.label }));
-        let tets = mesh.tets[self.tets.len()..].iter();
-        self.tets.extend(tets.map(|corners| corners.map(|wedge| wedge.0)));
+        self.pinned.extend_from_slice(tail.pinned);
+        self.nodes.extend(tail.wedges.iter().map(|wedge| Node { point: wedge.vertex.0, label: wedge.label }));
+        self.tets.extend(tail.tets.iter().map(|corners| corners.map(|wedge| wedge.0)));
         moved
     }
 

@@ -7,7 +7,7 @@
 
 use glam::DVec2;
 
-use super::scan::{GridPoint, center_offset};
+use super::grid::{GridPoint, center_offset};
 
 /// Corners of a pixel in the polygon's sense of turning; corner i ends side i, and side 0 is the upper one.
 const CORNERS: [DVec2; 4] =
@@ -234,7 +234,7 @@ const MOST_CORNERS: usize = 8;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::scan::{GRID_BITS, is_positive};
+    use crate::render::grid::{GRID_BITS, is_positive};
 
     /// No bound.
     const ALL: HalfPlane = HalfPlane { normal: DVec2::X, value: 1.0, reach: 0.5 };

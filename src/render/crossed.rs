@@ -10,12 +10,13 @@
 
 use std::ops::Range;
 
-use glam::{Vec3, Vec3A, Vec4};
+use glam::{Vec3A, Vec4};
 
-use super::canvas::Canvas;
+use super::canvas::{Canvas, ColorSpace};
 use super::coverage::Coverage;
+use super::grid::{GRID_BITS, GridPoint};
 use super::pack::BAND_ROWS;
-use super::scan::{GRID_BITS, GridPoint, touched};
+use super::scan::Outline;
 use super::shade::Shade;
 use super::view::View;
 
@@ -44,20 +45,21 @@ pub(super) struct Crossed {
 }
 
 impl Crossed {
-    /// Starts a band: marks the pixels that edges between labels cross, given polygons and which of their edges are (bit
-    /// i: from corner i to the next).
+    /// Starts a band: marks the pixels that edges between labels cross, given polygons, the number of their corners and
+    /// which of their edges are such (bit i: from corner i to the next).
     pub(super) fn start<'a>(
         &mut self,
         view: &View,
         rows: Range<i32>,
-        polygons: impl Iterator<Item = (&'a [GridPoint], u8)>,
+        polygons: impl Iterator<Item = (&'a Outline, u8, u8)>,
     ) {
         self.rows = rows;
         self.columns.clear();
         self.columns.resize(view.columns as usize, 0);
-        for (corners, boundary) in polygons.filter(|(_, boundary)| *boundary != 0) {
-            for i in (0..corners.len()).filter(|i| boundary >> i & 1 != 0) {
-                self.mark(view, corners[i], corners[(i + 1) % corners.len()]);
+        for (outline, count, boundary) in polygons.filter(|(_, _, boundary)| *boundary != 0) {
+            let (corners, count) = (outline.corners(), usize::from(count));
+            for i in (0..count).filter(|i| boundary >> i & 1 != 0) {
+                self.mark(view, corners[i], corners[(i + 1) % count]);
             }
         }
         let union = |columns: &[Rows]| columns.iter().fold(0, |union, rows| union | rows);
@@ -101,14 +103,12 @@ impl Crossed {
         }
     }
 
-    /// Adds what a polygon with these colours at its corners covers of the pixels.
-    pub(super) fn add(&mut self, corners: &[GridPoint], colors: &[Vec3; 4]) {
+    /// Adds what a polygon of `count` corners, with these colours in the channels of the canvas, covers of the pixels.
+    pub(super) fn add(&mut self, outline: &Outline, count: u8, colors: &[Vec4; 4], space: ColorSpace) {
         if self.sums.is_empty() {
             return;
         }
-        let Some((columns, rows)) = touched(corners, self.columns.len() as i32, self.rows.clone()) else {
-            return;
-        };
+        let Some((columns, rows)) = outline.hull().touched(self.columns.len() as i32, &self.rows) else { return };
         let from_first = Rows::MAX << (rows.start - self.rows.start);
         let within = from_first & Rows::MAX >> (self.rows.start + Rows::BITS as i32 - rows.end);
         let tiles = columns.start as usize / TILE..=(columns.end as usize - 1) / TILE;
@@ -116,8 +116,9 @@ impl Crossed {
         if tiles.peek().is_none() {
             return;
         }
-        let shade = Shade::new(corners, colors);
-        let coverage = Coverage::new(corners, [columns.start, rows.start]);
+        let shade = Shade::new(outline, colors, space);
+        let corners = outline.corners();
+        let coverage = Coverage::new(&corners[..count.into()], [columns.start, rows.start]);
         for tile in tiles {
             let in_tile = (tile * TILE) as i32..((tile + 1) * TILE) as i32;
             for column in columns.start.max(in_tile.start)..columns.end.min(in_tile.end) {

@@ -1,7 +1,7 @@
 //! From a slab's control mesh to pixels: subdivide, slice at a time, fill, pack into the pixel format.
 //!
 //! ```text
-//! complex -> rings -> level | refiner -> slice -> scan, shade -> canvas -> crossed -> pack
+//! complex -> rings -> level | refiner -> slice -> scan, run -> canvas -> crossed -> pack
 //! ```
 //!
 //! In: a mesh, a time, a size. Out: pixels; for the fit also masks ([`color_masks`], [`position_masks`]) and where
@@ -16,13 +16,16 @@ mod complex;
 mod coverage;
 mod crossed;
 mod draw;
+mod grid;
 mod interfaces;
 mod level;
 mod masks;
 mod pack;
+mod paint;
 mod parallel;
 mod refiner;
 mod rings;
+mod run;
 mod sample;
 mod scan;
 mod scene;
@@ -32,6 +35,7 @@ mod shade;
 mod slice;
 mod subdivide;
 mod view;
+mod window;
 
 pub use complex::{FINE_BITS, Node};
 pub use draw::{DrawParams, draw};

@@ -4,7 +4,7 @@
 //! In: a complex that grows at its ends, and planes. Out: the parents whose children a plane cuts. What was refined
 //! before more tets came to a vertex is refined anew, so that the result is that of the complex as it is.
 
-use glam::{IVec3, Vec3};
+use glam::{IVec3, Vec3, Vec3A};
 
 use super::children::{CHILDREN, EDGES, diagonal};
 use super::complex::{Complex, Stars};
@@ -34,8 +34,8 @@ impl FineNode {
 
     /// RGB in 8-bit levels.
     #[inline]
-    pub(super) fn levels(&self) -> Vec3 {
-        self.color.as_vec3() * (1.0 / FINE_LEVEL)
+    pub(super) fn levels(&self) -> Vec3A {
+        self.color.as_vec3a() * (1.0 / FINE_LEVEL)
     }
 }
 

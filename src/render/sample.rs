@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use glam::IVec3;
 
-use super::scan::{GridPoint, bounds, is_positive, scan};
+use super::grid::{GridPoint, is_positive};
+use super::scan::{Outline, scan};
 use super::slice::{SLICES, above, cross};
 use super::subdivide::Refined;
 use super::view::{View, Viewport, plane};
@@ -58,12 +59,13 @@ fn sample_tet(tet: [IVec3; 4], t: i32, view: &View, rows: Range<i32>, mut pixel:
     for last in 2..ends.len() {
         let picked = [0, last - 1, last];
         let triangle = picked.map(|corner| grid[corner]);
-        let Some((_, own)) = bounds(&triangle, view.columns, view.rows).filter(|_| is_positive(triangle)) else {
+        let outline = Outline::new(&triangle);
+        let Some(seen) = outline.hull().centers([view.columns, view.rows]).filter(|_| is_positive(triangle)) else {
             continue;
         };
-        let both = own.start.max(rows.start)..own.end.min(rows.end);
-        scan(&triangle, both, |row, columns| {
-            for column in columns.start.max(0)..columns.end.min(i64::from(view.columns)) {
+        let both = seen.rows.start.max(rows.start)..seen.rows.end.min(rows.end);
+        scan(&outline, view.columns, both, |row, columns| {
+            for column in columns {
                 let share = planar_weights(triangle, [column as f64 + 0.5, f64::from(row) + 0.5]);
                 let mut weights = [0.0f64; 4];
                 for (share, &corner) in share.into_iter().zip(&picked) {
@@ -71,7 +73,7 @@ fn sample_tet(tet: [IVec3; 4], t: i32, view: &View, rows: Range<i32>, mut pixel:
                     weights[below as usize] += share * (1.0 - parts[corner]);
                     weights[above as usize] += share * parts[corner];
                 }
-                pixel(row, column as usize, weights.map(|w| w as f32));
+                pixel(row, column, weights.map(|w| w as f32));
             }
         });
     }

@@ -1,272 +1,321 @@
 //! Which pixel centres a convex polygon covers, exactly.
 //!
-//! In: corners on a fixed-point grid. Out: spans of pixels. A centre on an edge belongs to the polygon below or to
-//! the right of it. The column at which an edge crosses a row is a function of the edge alone, always computed from its
-//! upper end; so polygons that share an edge leave no hole along it and draw no pixel twice.
+//! In: corners on the grid. Out: spans of pixels, four rows at a time. A centre on an edge belongs to the polygon below
+//! or to the right of it. The column at which an edge crosses a row is a function of the edge and the row alone, always
+//! computed from its upper end; so polygons that share an edge leave no hole along it and draw no pixel twice.
+//!
+//! Most polygons cover a few pixels in a few rows, so nothing here branches: the corners of a polygon, or its rows, lie
+//! side by side in a register.
 
 use std::ops::Range;
 
-use glam::DVec2;
+use wide::{f64x2, f64x4};
 
-/// Binary digits of the grid after the point: 2^-20 px. Snapping may turn over a triangle thinner than that; it is then
-/// skipped, and a pixel whose centre lies within so thin a strip is drawn by both neighbours.
-pub(super) const GRID_BITS: u32 = 20;
+use super::grid::{GridPoint, turn};
 
-const ONE: i64 = 1 << GRID_BITS;
-const HALF: i64 = ONE / 2;
-/// Below this, the difference of two products fits 64 bits.
-const NARROW: i64 = 1 << 31;
+/// Rows that are looked at together.
+pub(super) const ROWS: usize = 4;
 
-/// A position on a surface in multiples of 2^-[`GRID_BITS`] px, within +-2^60.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct GridPoint {
-    pub(super) x: i64,
-    pub(super) y: i64,
+const ZERO: f64x4 = f64x4::ZERO;
+const ONE: f64x4 = f64x4::new([1.0; 4]);
+const HALF: f64x4 = f64x4::new([0.5; 4]);
+/// What [`ROWS`] rows are from their first on.
+const STEPS: f64x4 = f64x4::new([0.0, 1.0, 2.0, 3.0]);
+
+/// Rounds up. Values are below 2^51, or what comes out is as large.
+#[inline(always)]
+fn ceil(v: f64x4) -> f64x4 {
+    // Added to it, a number has no digits after the point left.
+    const WHOLE: f64x4 = f64x4::new([(3u64 << 51) as f64; 4]);
+    let near = (v + WHOLE) - WHOLE;
+    near + (near.simd_lt(v) & ONE)
 }
 
-impl GridPoint {
-    /// In pixels.
-    pub(super) fn to_px(self) -> [f64; 2] {
-        [self.x as f64 / ONE as f64, self.y as f64 / ONE as f64]
-    }
+/// The values of the corners that follow.
+#[inline(always)]
+fn next(v: f64x4) -> f64x4 {
+    let [a, b, c, d] = v.to_array();
+    f64x4::new([b, c, d, a])
 }
 
-/// The first row or column whose centre is at `v` or beyond.
-#[inline]
-pub(super) fn first_center(v: i64) -> i64 {
-    (v + (HALF - 1)) >> GRID_BITS
-}
-
-/// How far a pixel's centre lies to the right of `from` and below it, in pixels. The difference is exact before it is
-/// rounded, so that it is small where the gradient of a sliver is large.
-#[inline]
-pub(super) fn center_distance(from: GridPoint, column: i64, row: i64) -> [f32; 2] {
-    const PIXEL: f32 = 1.0 / ONE as f32;
-    let distance = |center: i64, from: i64| ((center << GRID_BITS) + HALF - from) as f32 * PIXEL;
-    [distance(column, from.x), distance(row, from.y)]
-}
-
-/// Where a point lies from a pixel's centre (column, row), in pixels.
-#[inline]
-pub(super) fn center_offset(point: GridPoint, [column, row]: [i32; 2]) -> DVec2 {
-    let offset = |v: i64, pixel: i32| (v - ((i64::from(pixel) << GRID_BITS) + HALF)) as f64;
-    DVec2::new(offset(point.x, column), offset(point.y, row)) / ONE as f64
-}
-
-/// Whether the corners turn from +x to +y, as slices of positive tets do; false if they are in line.
-#[inline]
-pub(super) fn is_positive(corners: [GridPoint; 3]) -> bool {
-    turn(corners) > 0
-}
-
-/// Twice the area of a triangle in units of the grid, positive if it turns from +x to +y; saturated at the ends of 64
-/// bits.
-#[inline]
-pub(super) fn turn([a, b, c]: [GridPoint; 3]) -> i64 {
-    let [ux, uy, vx, vy] = [b.x - a.x, b.y - a.y, c.x - a.x, c.y - a.y];
-    if [ux, uy, vx, vy].iter().all(|d| d.abs() < NARROW) {
-        ux * vy - uy * vx
-    } else {
-        wide_turn([ux, uy], [vx, vy]).clamp(i64::MIN.into(), i64::MAX.into()) as i64
-    }
-}
-
-/// Twice the area of a triangle in pixels, exact before it is rounded.
-#[inline]
-pub(super) fn double_area([a, b, c]: [GridPoint; 3]) -> f64 {
-    const PIXELS: f64 = 1.0 / (1u64 << (2 * GRID_BITS)) as f64;
-    match turn([a, b, c]) {
-        i64::MIN | i64::MAX => wide_turn([b.x - a.x, b.y - a.y], [c.x - a.x, c.y - a.y]) as f64 * PIXELS,
-        exact => exact as f64 * PIXELS,
-    }
-}
-
-#[cold]
-fn wide_turn(u: [i64; 2], v: [i64; 2]) -> i128 {
-    let ([ux, uy], [vx, vy]) = (u.map(i128::from), v.map(i128::from));
-    ux * vy - uy * vx
-}
-
-/// Rows and columns of centres within the polygon's bounds, cut to a surface of this size; `None` if there are none.
-#[inline]
-pub(super) fn bounds(corners: &[GridPoint], columns: i32, rows: i32) -> Option<(Range<i32>, Range<i32>)> {
-    let (low, high) = hull(corners);
-    let cut = |low: i64, high: i64, size: i32| {
-        let first = first_center(low).max(0);
-        let end = first_center(high).min(i64::from(size));
-        (first < end).then_some(first as i32..end as i32)
-    };
-    cut(low.x, high.x, columns).zip(cut(low.y, high.y, rows))
-}
-
-/// Columns (below `columns`) and rows (among `rows`) of pixels that the polygon's bounds touch; `None` if there are
-/// none.
-#[inline]
-pub(super) fn touched(corners: &[GridPoint], columns: i32, rows: Range<i32>) -> Option<(Range<i32>, Range<i32>)> {
-    let (low, high) = hull(corners);
-    let cut = |low: i64, high: i64, pixels: Range<i32>| {
-        let first = (low >> GRID_BITS).max(pixels.start.into());
-        let end = (-(-high >> GRID_BITS)).min(pixels.end.into());
-        (first < end).then_some(first as i32..end as i32)
-    };
-    cut(low.x, high.x, 0..columns).zip(cut(low.y, high.y, rows))
-}
-
-/// The least and the greatest coordinates; `corners` are not empty.
-#[inline]
-pub(super) fn hull(corners: &[GridPoint]) -> (GridPoint, GridPoint) {
-    let (mut low, mut high) = (corners[0], corners[0]);
-    for corner in &corners[1..] {
-        low = GridPoint { x: low.x.min(corner.x), y: low.y.min(corner.y) };
-        high = GridPoint { x: high.x.max(corner.x), y: high.y.max(corner.y) };
-    }
-    (low, high)
-}
-
-/// Calls `span(row, columns)` for each of `rows` in which the polygon covers centres; columns are not cut to the
-/// surface. It must be convex and turn from +x to +y ([`turn`]).
-#[inline]
-pub(super) fn scan(corners: &[GridPoint], rows: Range<i32>, mut span: impl FnMut(i32, Range<i64>)) {
-    if rows.is_empty() {
-        return;
-    }
-    let top = (1..corners.len()).fold(0, |top, i| if corners[i].y < corners[top].y { i } else { top });
-    let bottom = hull(corners).1.y;
-    let cut = |y: i64| first_center(y).clamp(i64::from(rows.start), i64::from(rows.end)) as i32;
-    let (mut row, end) = (cut(corners[top].y), cut(bottom));
-    let mut left = Side { at: top, step: corners.len() - 1, end: row, edge: Edge::default() };
-    let mut right = Side { step: 1, ..left };
-    while row < end {
-        left.reach(corners, row);
-        right.reach(corners, row);
-        let stop = left.end.min(right.end).min(end);
-        if stop <= row {
-            return;
-        }
-        if left.edge.is_wide || right.edge.is_wide {
-            for row in row..stop {
-                let columns = left.edge.wide_column(row)..right.edge.wide_column(row);
-                if !columns.is_empty() {
-                    span(row, columns);
-                }
-            }
-        } else {
-            let mut at = [left.edge.at(row), right.edge.at(row)];
-            for row in row..stop {
-                let columns = at[0] >> EDGE_BITS..at[1] >> EDGE_BITS;
-                if !columns.is_empty() {
-                    span(row, columns);
-                }
-                at = [at[0].wrapping_add(left.edge.step), at[1].wrapping_add(right.edge.step)];
-            }
-        }
-        row = stop;
-    }
-}
-
-/// One side of a convex polygon on the way down.
+/// Corners of a polygon in pixels, multiples of 2^-[`super::grid::GRID_BITS`]. A triangle's last corner stands twice.
 #[derive(Debug, Clone, Copy)]
-struct Side {
-    /// The corner that the present edge leads to.
-    at: usize,
-    /// What leads from a corner to the next one down, modulo the number of corners.
-    step: usize,
-    /// The first row beyond the present edge.
-    end: i32,
-    edge: Edge,
+pub(super) struct Outline {
+    pub(super) x: f64x4,
+    pub(super) y: f64x4,
 }
 
-impl Side {
-    /// Goes on to the edge that crosses `row`, if the present one does not.
+/// The least and the greatest coordinates of an outline, (x, y) each.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hull {
+    low: f64x2,
+    high: f64x2,
+}
+
+/// Where on a surface a polygon is seen. Neither rows nor columns are empty.
+#[derive(Debug, Clone)]
+pub(super) struct Seen {
+    /// The first column.
+    pub(super) column: i32,
+    pub(super) rows: Range<i32>,
+}
+
+impl Hull {
+    /// Of corners (x, y).
+    #[inline(always)]
+    pub(super) fn new([a, b, c, d]: [f64x2; 4]) -> Self {
+        // Nothing here is no number, so there is no need to ask.
+        Self { low: a.fast_min(b).fast_min(c.fast_min(d)), high: a.fast_max(b).fast_max(c.fast_max(d)) }
+    }
+
+    /// The larger side, in pixels.
+    #[inline(always)]
+    pub(super) fn extent(&self) -> f64 {
+        let [width, height] = (self.high - self.low).to_array();
+        if width > height { width } else { height }
+    }
+
+    /// Where there are centres within, cut to a surface of this size; `None` if there are none.
+    #[inline(always)]
+    pub(super) fn centers(&self, size: [i32; 2]) -> Option<Seen> {
+        let half = f64x2::splat(0.5);
+        Self::cut(self.low - half, self.high - half, size)
+    }
+
+    /// Where it touches pixels, cut to a surface of this size; `None` if it touches none.
+    #[inline(always)]
+    pub(super) fn pixels(&self, size: [i32; 2]) -> Option<Seen> {
+        // The first pixel is the last whose upper left corner is at or before it.
+        let first = -ceil(join(-self.low, self.high));
+        let [column, row, ..] = first.to_array();
+        Self::cut(f64x2::new([column, row]), self.high, size)
+    }
+
+    /// Columns (below `columns`) and rows (among `rows`) of the pixels that it touches; `None` if there are none.
     #[inline]
-    fn reach(&mut self, corners: &[GridPoint], row: i32) {
-        // No side has more edges than there are corners.
-        for _ in 0..corners.len() {
-            if self.end > row {
-                return;
-            }
-            let upper = corners[self.at];
-            self.at += self.step;
-            if self.at >= corners.len() {
-                self.at -= corners.len();
-            }
-            let lower = corners[self.at];
-            // Saturates: the surface's rows are far within 32 bits.
-            self.end = first_center(lower.y).clamp(i32::MIN.into(), i32::MAX.into()) as i32;
-            if self.end > row {
-                self.edge = Edge::new(upper, lower);
-            }
+    pub(super) fn touched(&self, columns: i32, rows: &Range<i32>) -> Option<(Range<i32>, Range<i32>)> {
+        let [left, top, right, bottom] = ceil(join(-self.low, self.high)).to_array();
+        let (left, right) = ((-left).max(0.0), right.min(columns.into()));
+        let (top, bottom) = ((-top).max(rows.start.into()), bottom.min(rows.end.into()));
+        let is_seen = left < right && top < bottom;
+        is_seen.then(|| (whole(left)..whole(right), whole(top)..whole(bottom)))
+    }
+
+    /// What of columns and rows, rounded up, lies on the surface.
+    #[inline(always)]
+    fn cut(first: f64x2, end: f64x2, [columns, rows]: [i32; 2]) -> Option<Seen> {
+        let size = f64x2::new([columns.into(), rows.into()]);
+        let cut = ceil(join(first, end)).fast_max(ZERO).fast_min(join(size, size));
+        let [column, row, end_column, end_row] = cut.to_array();
+        if column < end_column && row < end_row {
+            return Some(Seen { column: whole(column), rows: whole(row)..whole(end_row) });
         }
+        None
     }
 }
 
-/// Binary digits after the point of an edge's columns.
-const EDGE_BITS: u32 = 28;
-
-/// The first column whose centre is right of an edge or on it, row by row. A function of the edge's ends and the row
-/// alone: rounding may move the line by less than 2^-13 px, but for all that share it.
-#[derive(Debug, Clone, Copy, Default)]
-struct Edge {
-    upper: GridPoint,
-    /// Pixels to the right a row.
-    slope: f64,
-    /// The first row whose centre the edge reaches.
-    first: i64,
-    /// There, with [`EDGE_BITS`] digits, such that cutting them off gives the column.
-    column: i64,
-    /// To the next row.
-    step: i64,
-    /// Too long for these digits.
-    is_wide: bool,
+#[inline(always)]
+fn join(low: f64x2, high: f64x2) -> f64x4 {
+    let ([a, b], [c, d]) = (low.to_array(), high.to_array());
+    f64x4::new([a, b, c, d])
 }
 
-impl Edge {
-    /// An edge from its upper to its lower end (upper.y < lower.y).
+/// A whole number below 2^31 that is not negative.
+#[inline(always)]
+fn whole(v: f64) -> i32 {
+    // Added to 2^52, a number's last digits are those of the integer.
+    (v + (1u64 << 52) as f64).to_bits() as i32
+}
+
+impl Outline {
+    pub(super) const NOTHING: Self = Self { x: ZERO, y: ZERO };
+
+    /// Below this, in pixels, products of differences are exact.
+    const SMALL: f64 = 64.0;
+
+    /// Of corners (x, y).
+    #[inline(always)]
+    pub(super) fn of_places([a, b, c, d]: [f64x2; 4]) -> Self {
+        let ([ab_x, ab_y], [cd_x, cd_y]) = (f64x2::transpose([a, b]), f64x2::transpose([c, d]));
+        Self { x: join(ab_x, cd_x), y: join(ab_y, cd_y) }
+    }
+
+    /// Of three or four corners.
+    pub(super) fn new(corners: &[GridPoint]) -> Self {
+        let [x, y]: [[f64; 4]; 2] =
+            std::array::from_fn(|axis| std::array::from_fn(|i| corners[i.min(corners.len() - 1)].to_px()[axis]));
+        Self { x: f64x4::new(x), y: f64x4::new(y) }
+    }
+
+    /// The corners in order.
     #[inline]
-    fn new(upper: GridPoint, lower: GridPoint) -> Self {
-        const WIDEST: i64 = 1 << 50;
-        const SHIFT: u32 = EDGE_BITS - GRID_BITS;
-        let (dx, dy) = (lower.x - upper.x, lower.y - upper.y);
-        let slope = dx as f64 / dy as f64;
-        let first = first_center(upper.y);
-        let below = ((first << GRID_BITS) + HALF - upper.y) as f64;
-        // An edge that is steep this way has one row at most, and casts saturate.
-        let moved = (slope * below * f64::from(1 << SHIFT)) as i64;
-        let start = (upper.x << SHIFT).wrapping_add((HALF << SHIFT) - 1);
+    pub(super) fn corners(&self) -> [GridPoint; 4] {
+        let (x, y) = (self.x.to_array(), self.y.to_array());
+        std::array::from_fn(|i| GridPoint::from_px(x[i], y[i]))
+    }
+
+    /// What it extends over.
+    pub(super) fn hull(&self) -> Hull {
+        let (x, y) = (self.x.to_array(), self.y.to_array());
+        Hull::new(std::array::from_fn(|i| f64x2::new([x[i], y[i]])))
+    }
+
+    /// From the first corner to the third, and from the second to the fourth: (x, y) each.
+    #[inline(always)]
+    pub(super) fn diagonals(self) -> [[f64; 2]; 2] {
+        let ([ax, bx, cx, dx], [ay, by, cy, dy]) = (self.x.to_array(), self.y.to_array());
+        [[cx - ax, cy - ay], [dx - bx, dy - by]]
+    }
+
+    /// Twice the area, positive if it turns from +x to +y; its sign is exact where [`Self::SMALL`] says so.
+    #[inline(always)]
+    pub(super) fn double_area(self) -> f64 {
+        let [u, v] = self.diagonals();
+        u[0] * v[1] - u[1] * v[0]
+    }
+
+    /// Whether it has an area, turns from +x to +y and is convex, exactly.
+    #[inline(always)]
+    pub(super) fn is_convex(self, extent: f64) -> bool {
+        if extent >= Self::SMALL {
+            return self.is_convex_and_large();
+        }
+        let (ex, ey) = (next(self.x) - self.x, next(self.y) - self.y);
+        let turns = ex * next(ey) - ey * next(ex);
+        !turns.simd_lt(ZERO).any() && self.double_area() > 0.0
+    }
+
+    #[cold]
+    fn is_convex_and_large(self) -> bool {
+        let [a, b, c, d] = self.corners();
+        let halves = [turn([a, b, c]), turn([a, c, d])];
+        halves[0] >= 0 && halves[1] >= 0 && halves != [0, 0] && turn([b, c, d]) >= 0 && turn([d, a, b]) >= 0
+    }
+}
+
+/// The edges of a convex polygon that turns from +x to +y.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Edges {
+    /// Upper ends, half a pixel to the left: columns count from centres.
+    x: [f64; 4],
+    y: [f64; 4],
+    /// Pixels to the right a row; of no meaning where an edge reaches no centre.
+    slope: [f64; 4],
+    /// The first row whose centre is at a corner or below it.
+    first: [f64; 4],
+}
+
+impl Edges {
+    #[inline]
+    pub(super) fn new(Outline { x, y }: Outline) -> Self {
+        let (next_x, next_y) = (next(x), next(y));
+        let upper_x = next_y.simd_lt(y).bitselect(next_x, x);
         Self {
-            upper,
-            slope,
-            first,
-            column: start.wrapping_add(moved),
-            step: (slope * f64::from(1 << EDGE_BITS)) as i64,
-            is_wide: dx.abs() >= WIDEST || upper.x.abs() >= WIDEST,
+            x: (upper_x - HALF).to_array(),
+            y: next_y.fast_min(y).to_array(),
+            slope: ((next_x - x) / (next_y - y)).to_array(),
+            first: ceil(y - HALF).to_array(),
         }
     }
 
-    /// Where it crosses a row, with [`EDGE_BITS`] digits.
+    /// What lies between the edges in the rows from `row` on, on a surface `width` pixels wide.
     #[inline]
-    fn at(&self, row: i32) -> i64 {
-        self.column.wrapping_add(self.step.wrapping_mul(i64::from(row) - self.first))
+    pub(super) fn spans(&self, row: i32, width: i32) -> [Span; ROWS] {
+        let rows = f64x4::splat(row.into()) + STEPS;
+        let centers = rows + HALF;
+        let below = |corner: usize| rows.simd_ge(f64x4::splat(self.first[corner]));
+        let below = [below(0), below(1), below(2), below(3)];
+        let (mut left, mut right) = (ZERO, ZERO);
+        for i in 0..4 {
+            let at = (centers - f64x4::splat(self.y[i])) * f64x4::splat(self.slope[i]) + f64x4::splat(self.x[i]);
+            // Rows that an edge crosses are below one end of it alone; edges on the right go down.
+            let (from, to) = (below[i], below[(i + 1) % 4]);
+            right |= at & (from & !to);
+            left |= at & (to & !from);
+        }
+        let cut = |v: f64x4| ceil(v).fast_max(ZERO).fast_min(f64x4::splat(width.into()));
+        Span::pack(cut(left), cut(right))
+    }
+}
+
+/// Columns of a row: the first in the lower half, the end in the upper one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Span(u32);
+
+impl Span {
+    pub(super) const EMPTY: Self = Self(0);
+
+    /// Of whole numbers below 2^16.
+    #[inline]
+    fn pack(first: f64x4, end: f64x4) -> [Self; ROWS] {
+        const UPPER: f64x4 = f64x4::new([65536.0; 4]);
+        // Added to 2^52, a number's last digits are those of the integer.
+        const WHOLE: f64x4 = f64x4::new([(1u64 << 52) as f64; 4]);
+        let [a, b, c, d] = (first + end * UPPER + WHOLE).to_array();
+        let span = |v: f64| Self(v.to_bits() as u32);
+        [span(a), span(b), span(c), span(d)]
     }
 
-    /// The column in a row, of a wide edge.
-    fn wide_column(&self, row: i32) -> i64 {
-        let below = ((i64::from(row) << GRID_BITS) + HALF - self.upper.y) as f64;
-        let x = self.upper.x.saturating_add((self.slope * below) as i64);
-        first_center(x.clamp(-(1 << 60), 1 << 60))
+    /// Of these columns, below 2^16.
+    #[cfg(test)]
+    pub(super) fn of(columns: Range<usize>) -> Self {
+        Self((columns.start | columns.end << 16) as u32)
+    }
+
+    /// Whether none of these has a column.
+    #[inline(always)]
+    pub(super) fn are_empty(spans: &[Self; ROWS]) -> bool {
+        let has = |span: Self| span.0 >> 16 > span.0 & 0xffff;
+        !(has(spans[0]) | has(spans[1]) | has(spans[2]) | has(spans[3]))
+    }
+
+    /// Any number, in the place of columns.
+    #[inline]
+    pub(super) fn number(number: u32) -> Self {
+        Self(number)
+    }
+
+    /// What [`Self::number`] was given.
+    #[inline]
+    pub(super) fn to_number(self) -> u32 {
+        self.0
+    }
+
+    /// The columns; none if the end is not beyond the first.
+    #[inline]
+    pub(super) fn columns(self) -> Range<usize> {
+        (self.0 & 0xffff) as usize..(self.0 >> 16) as usize
+    }
+}
+
+/// Calls `span(row, columns)` for each of `rows` in which a convex polygon that turns from +x to +y covers centres of a
+/// surface `width` pixels wide.
+#[inline]
+pub(super) fn scan(outline: &Outline, width: i32, rows: Range<i32>, mut span: impl FnMut(i32, Range<usize>)) {
+    let edges = Edges::new(*outline);
+    for first in rows.clone().step_by(ROWS) {
+        for (row, found) in (first..rows.end).zip(edges.spans(first, width)) {
+            let columns = found.columns();
+            if !columns.is_empty() {
+                span(row, columns);
+            }
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::grid::{GRID_BITS, is_positive};
     use super::*;
+
+    const ONE: i64 = 1 << GRID_BITS;
 
     fn cover(corners: [[i64; 2]; 3], size: i32, scale: i64) -> Vec<(i32, i32)> {
         let corners = corners.map(|[x, y]| GridPoint { x: x * scale, y: y * scale });
         assert!(is_positive(corners));
         let mut pixels = Vec::new();
-        scan(&corners, 0..size, |row, columns| {
-            pixels.extend((columns.start.max(0)..columns.end.min(i64::from(size))).map(|x| (x as i32, row)));
+        scan(&Outline::new(&corners), size, 0..size, |row, columns| {
+            pixels.extend(columns.map(|x| (x as i32, row)));
         });
         pixels
     }
@@ -287,37 +336,64 @@ mod tests {
         assert_eq!(cover([[3, 3], [7, 3], [7, 7]], 8, half), [(1, 1), (2, 1), (2, 2)]);
     }
 
-    /// Long edges take the other arithmetic; a neighbour sees the same long edge, but the columns must also be right.
+    /// Columns are those of the line, as exactly as its slope allows, also of edges far longer than a surface.
     #[test]
-    fn wide_edges_agree_with_narrow_ones() {
-        let wide = Edge::new(
-            GridPoint { x: -(1 << 51), y: -(1 << 51) + ONE / 3 },
-            GridPoint { x: (1 << 51) + ONE / 7, y: (1 << 51) - ONE },
-        );
-        assert!(wide.is_wide);
-        let line = |row: i64| {
-            let y = (row << GRID_BITS) + HALF;
-            let below = i128::from(y + (1 << 51) - ONE / 3);
-            (-(1i128 << 51)
-                + ((1i128 << 52) + i128::from(ONE / 7)) * below / ((1i128 << 52) - i128::from(ONE + ONE / 3)))
-                as i64
-        };
-        for row in [-5, 0, 1, 77, 1000] {
-            assert_eq!(wide.wide_column(row), first_center(line(row.into())), "row {row}");
+    fn columns_are_those_of_the_line() {
+        for shift in [0, 10, 20, 28] {
+            let [dx, dy] = [(7 * ONE + 3) << shift, (5 * ONE + 1) << shift];
+            let upper = GridPoint { x: 40 * ONE + 11 - dx / 2, y: 30 * ONE + 7 - dy / 2 };
+            let lower = GridPoint { x: upper.x + dx, y: upper.y + dy };
+            let outline = Outline::new(&[upper, GridPoint { x: 2 * lower.x - upper.x, y: upper.y }, lower]);
+            let first = if shift == 0 { 28 } else { 0 };
+            for row in (first..32).step_by(ROWS) {
+                for (row, span) in (row..).zip(Edges::new(outline).spans(row, 1000)) {
+                    let below = i128::from((i64::from(row) << GRID_BITS) + ONE / 2 - upper.y);
+                    let line = upper.x + (i128::from(dx) * below / i128::from(dy)) as i64;
+                    if (line - ONE / 2 + 2) & (ONE - 1) < 4 {
+                        // Too close to a centre for the rounding of this line.
+                        continue;
+                    }
+                    let expected = ((line + ONE / 2 - 1) >> GRID_BITS).max(0);
+                    assert_eq!(span.columns().start as i64, expected, "shift {shift}, row {row}");
+                }
+            }
         }
     }
 
-    /// A row's column does not depend on the row at which an edge was entered.
+    /// A row's columns do not depend on the rows that they are looked up with.
     #[test]
     fn bands_of_rows_add_up() {
         let corners = [[3, 1], [97, 40], [60, 89], [11, 77]].map(|[x, y]| GridPoint { x: x * ONE / 3, y: y * ONE / 3 });
+        let outline = Outline::new(&corners);
         let mut whole = Vec::new();
-        scan(&corners, 0..40, |row, columns| whole.push((row, columns)));
+        scan(&outline, 40, 0..40, |row, columns| whole.push((row, columns)));
         let mut parts = Vec::new();
         for row in 0..40 {
-            scan(&corners, row..row + 1, |row, columns| parts.push((row, columns)));
+            scan(&outline, 40, row..row + 1, |row, columns| parts.push((row, columns)));
         }
         assert_eq!(whole, parts);
         assert!(whole.len() > 25);
+    }
+
+    /// In floating point where polygons are small, in integers where they are not: the same answer.
+    #[test]
+    fn convex_is_exact_at_every_size() {
+        let mut seed = 5u64;
+        let mut random = |end: i64| {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 33) as i64 % end
+        };
+        let mut seen = [0; 2];
+        for n in 0..4000 {
+            // Close to a line, so that turns are as often 0 or barely something else.
+            let along = [1, 1 << 10, ONE][n % 3];
+            let mut corner = || GridPoint { x: along * random(40) + random(2), y: along * random(40) / 7 + random(2) };
+            let corners = [corner(), corner(), corner(), corner()];
+            let outline = Outline::new(&corners);
+            let found = outline.is_convex(outline.hull().extent());
+            assert_eq!(found, outline.is_convex_and_large(), "{corners:?}");
+            seen[usize::from(found)] += 1;
+        }
+        assert!(seen[1] > 100 && seen[0] > 100, "{seen:?}");
     }
 }

@@ -1,16 +1,20 @@
 //! A slab as it is drawn: the control mesh as far as it has come, and the levels refined so far.
 
-use glam::{DVec2, IVec3, Vec3};
+use glam::IVec3;
 
 use super::active::Active;
+use super::canvas::ColorSpace;
 use super::complex::{Complex, FINE_BITS};
-use super::draw::{Painters, Pieces};
+use super::draw::Pieces;
 use super::interfaces::{Faces, Interfaces, child_faces};
+use super::paint::Painters;
 use super::parallel::{List, fill_chunks};
 use super::refiner::{FineNode, Refiner, Span, fine_color};
 use super::second::Second;
-use super::slice::{SLICES, above, blend, cross, edges_on};
-use crate::mesh::{Domain, TetMesh};
+use super::slice::{Polygon, SliceNode, slice};
+use super::view::Viewport;
+use super::window::Extents;
+use crate::mesh::{Domain, MeshCounts, MeshTail, TetMesh};
 
 /// First-level children that the second level may hold before it starts anew; or four times what a picture needs, if
 /// that is more. About 150 bytes each.
@@ -30,9 +34,13 @@ pub struct Scene {
     /// One a node, in fine levels.
     colors: Vec<IVec3>,
     /// One a node: its position and colour side by side.
-    nodes: Vec<FineNode>,
+    nodes: Vec<SliceNode>,
+    /// What their colours are in.
+    space: ColorSpace,
     spans: Vec<Span>,
     active: Active,
+    /// As of the last picture of a part.
+    extents: Extents,
     /// As of the last anti-aliased picture.
     interfaces: Interfaces,
     /// Level 1; empty until it is first asked for.
@@ -44,18 +52,6 @@ pub struct Scene {
     pub(super) painters: Painters,
 }
 
-/// A polygon's corner: its place in fine units, and its colour.
-pub(super) type Corner = (DVec2, Vec3);
-
-/// A tet's part of a slice.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Polygon<'a> {
-    /// 3 or 4; convex.
-    pub(super) corners: &'a [Corner],
-    /// Edges that lie between labels, as far as interfaces are known; bit i: the edge from corner i to the next.
-    pub(super) boundary: u8,
-}
-
 impl Scene {
     /// A scene without tets.
     pub fn new(domain: Domain) -> Self {
@@ -64,8 +60,10 @@ impl Scene {
             complex: Complex::default(),
             colors: Vec::new(),
             nodes: Vec::new(),
+            space: ColorSpace::Rgb,
             spans: Vec::new(),
             active: Active::new(domain.unit() << FINE_BITS),
+            extents: Extents::default(),
             interfaces: Interfaces::new(),
             refiner: Refiner::default(),
             second: Second::default(),
@@ -87,19 +85,47 @@ impl Scene {
     /// Takes in what `mesh` gained since the last call. It must be the same mesh, changed at the ends of its arrays
     /// only; its duration may change.
     pub fn extend(&mut self, mesh: &TetMesh) {
-        let (nodes, tets) = (self.complex.nodes.len(), self.complex.tets.len());
-        self.domain = mesh.domain;
+        let known = self.counts();
         let moved = self.complex.extend(mesh);
+        self.take_in(&mesh.tail(known), &moved);
+    }
+
+    /// Takes in what a mesh gained: all tails, one after the other, are [`Self::extend`] with the mesh.
+    pub fn append(&mut self, tail: &MeshTail<'_>) {
+        let moved = self.complex.append(tail);
+        self.take_in(tail, &moved);
+    }
+
+    fn counts(&self) -> MeshCounts {
+        let Complex { points, nodes, tets, .. } = &self.complex;
+        MeshCounts { vertices: points.len(), wedges: nodes.len(), tets: tets.len() }
+    }
+
+    /// Takes in what the complex has taken in, given the points that changed sides.
+    fn take_in(&mut self, tail: &MeshTail<'_>, moved: &[u32]) {
+        self.domain = tail.domain;
         if !moved.is_empty() {
-            self.refiner.forget_around(&self.complex, &moved);
+            self.refiner.forget_around(&self.complex, moved);
             self.second = Second::default();
         }
-        self.colors.extend(mesh.wedges[nodes..].iter().map(|wedge| fine_color(wedge.color)));
-        let complex = &self.complex;
-        let node = |node: usize| FineNode { position: complex.position(node as u32), color: self.colors[node] };
-        self.nodes.extend((nodes..complex.nodes.len()).map(node));
-        let span = |corners: &[u32; 4]| Span::of(corners.map(|node| complex.position(node)));
-        self.spans.extend(self.complex.tets[tets..].iter().map(span));
+        self.colors.extend(tail.wedges.iter().map(|wedge| fine_color(wedge.color)));
+        for node in self.nodes.len()..self.complex.nodes.len() {
+            self.nodes.push(self.slice_node(node));
+        }
+        let span = |corners: &[u32; 4]| Span::of(corners.map(|node| self.complex.position(node)));
+        self.spans.extend(self.complex.tets[self.spans.len()..].iter().map(span));
+    }
+
+    fn slice_node(&self, node: usize) -> SliceNode {
+        let position = self.complex.position(node as u32);
+        SliceNode::new(&FineNode { position, color: self.colors[node] }, self.space)
+    }
+
+    /// From now on polygons have their colours in the channels of a canvas of this kind.
+    pub(super) fn color_in(&mut self, space: ColorSpace) {
+        if std::mem::replace(&mut self.space, space) != space {
+            self.nodes = (0..self.nodes.len()).map(|node| self.slice_node(node)).collect();
+        }
     }
 
     /// Brings what is known of interfaces up to date. False if there are none.
@@ -110,24 +136,39 @@ impl Scene {
 
     /// Cuts the scene, subdivided `levels` times, at `t` (fine units). `make` appends to a list what the caller keeps
     /// of each polygon, given the control tet. Lists, one after the other, hold polygons in the order
-    /// of control tets and of children; what was in them is gone.
+    /// of control tets and of children; what was in them is gone. Given a part of the picture, and the size of the surface
+    /// that it is stretched over, polygons that are not seen there may be left out.
     pub(super) fn cut<L: List>(
         &mut self,
         t: i32,
         levels: u8,
+        part: Option<(Viewport, (u32, u32))>,
         lists: &mut Vec<L>,
         make: impl Fn(&mut L, u32, Polygon<'_>) + Sync + Send,
     ) {
         if levels == 0 {
-            let tets = self.active.cut(&self.spans, t);
-            let corners = |tet: u32| self.complex.tets[tet as usize].map(|node| self.nodes[node as usize]);
+            let mut tets = self.active.cut(&self.spans, t);
+            let seen: Vec<u32>;
+            if let Some((viewport, size)) = part {
+                self.extents.extend(&self.domain, &self.complex);
+                let window = self.extents.window(&self.domain, &viewport, size);
+                seen = tets.iter().copied().filter(|&tet| self.extents.is_seen(tet, &window)).collect();
+                tets = &seen;
+            }
+            let corners = |tet: u32| {
+                let [a, b, c, d] = self.complex.tets[tet as usize];
+                let node = |node: u32| self.nodes[node as usize];
+                [node(a), node(b), node(c), node(d)]
+            };
             return fill_chunks(lists, tets.len(), CHUNK, |list, run| {
                 for tets in tets[run].chunks(BATCH) {
                     // Nodes lie far apart: fetched in one go, the waits for them overlap.
-                    let mut nodes = [[FineNode::ZERO; 4]; BATCH];
+                    let mut nodes = [[SliceNode::ZERO; 4]; BATCH];
                     nodes.iter_mut().zip(tets).for_each(|(nodes, &tet)| *nodes = corners(tet));
-                    for (nodes, &tet) in nodes.iter().zip(tets) {
-                        slice(nodes, t, self.interfaces.faces(tet), |polygon| make(list, tet, polygon));
+                    for ([a, b, c, d], &tet) in nodes.iter().zip(tets) {
+                        if let Some(polygon) = slice([a, b, c, d], t, self.interfaces.faces(tet)) {
+                            make(list, tet, polygon);
+                        }
                     }
                 }
             });
@@ -140,7 +181,12 @@ impl Scene {
                 self.second = Second::default();
             }
             return collect(lists, &tets, |polygons, tet| {
-                let parent = Parent { level: (&self.refiner, &self.complex), tet, faces: self.interfaces.faces(tet) };
+                let parent = Parent {
+                    level: (&self.refiner, &self.complex),
+                    tet,
+                    faces: self.interfaces.faces(tet),
+                    space: self.space,
+                };
                 parent.slice_children(t, |polygon| make(polygons, tet, polygon));
             });
         }
@@ -151,7 +197,7 @@ impl Scene {
             let control = second.parent(tet);
             let child = self.refiner.children(control)[tet as usize % 8];
             let faces = child_faces(child, self.interfaces.faces(control));
-            let parent = Parent { level: second.level(), tet, faces };
+            let parent = Parent { level: second.level(), tet, faces, space: self.space };
             parent.slice_children(t, |polygon| make(polygons, control, polygon));
         });
     }
@@ -202,31 +248,17 @@ struct Parent<'a> {
     tet: u32,
     /// Its faces between labels.
     faces: Faces,
+    space: ColorSpace,
 }
 
 impl Parent<'_> {
     #[inline]
     fn slice_children(&self, t: i32, mut polygon: impl FnMut(Polygon<'_>)) {
         let (refiner, complex) = self.level;
-        let nodes = refiner.ten(complex, self.tet);
+        let nodes = refiner.ten(complex, self.tet).map(|node| SliceNode::new(&node, self.space));
         for child in refiner.children(self.tet) {
-            slice(&child.map(|i| nodes[i as usize]), t, child_faces(*child, self.faces), &mut polygon);
+            let faces = child_faces(*child, self.faces);
+            slice(child.map(|i| &nodes[usize::from(i)]), t, faces).into_iter().for_each(&mut polygon);
         }
     }
-}
-
-/// Slices one tet.
-#[inline]
-fn slice(nodes: &[FineNode; 4], t: i32, faces: Faces, mut polygon: impl FnMut(Polygon<'_>)) {
-    let edges = SLICES[above(nodes.map(|node| node.position), t)];
-    if edges.is_empty() {
-        return;
-    }
-    let mut corners = [Corner::default(); 4];
-    for (corner, ends) in corners.iter_mut().zip(edges) {
-        let [below, above] = ends.map(|end| &nodes[end as usize]);
-        let (part, place) = cross(below.position, above.position, t);
-        *corner = (place, blend(below.levels(), above.levels(), part));
-    }
-    polygon(Polygon { corners: &corners[..edges.len()], boundary: edges_on(edges, faces) });
 }

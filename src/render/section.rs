@@ -2,6 +2,7 @@
 
 use glam::{DVec2, Vec3};
 
+use super::canvas::ColorSpace;
 use super::complex::FINE_BITS;
 use super::scene::Scene;
 use super::view::plane;
@@ -28,12 +29,13 @@ pub fn cross_section(mesh: &TetMesh, frame: f64, levels: u8) -> Vec<SectionPolyg
     scene.extend(mesh);
     let fine = f64::from(mesh.domain.unit()) * f64::from(1 << FINE_BITS);
     let mut lists: Vec<Vec<SectionPolygon>> = Vec::new();
-    scene.cut(plane(&mesh.domain, frame), levels, &mut lists, |polygons, tet, polygon| {
+    scene.cut(plane(&mesh.domain, frame), levels, None, &mut lists, |polygons, tet, polygon| {
+        let count = usize::from(polygon.count);
         polygons.push(SectionPolygon {
             tet,
             label: mesh.tet_label(tet as usize),
-            corners: polygon.corners.iter().map(|(place, _)| *place / fine).collect(),
-            colors: polygon.corners.iter().map(|(_, color)| *color).collect(),
+            corners: polygon.places[..count].iter().map(|place| DVec2::from_array(place.to_array()) / fine).collect(),
+            colors: polygon.colors()[..count].iter().map(|color| ColorSpace::Rgb.to_rgb(*color).into()).collect(),
         });
     });
     lists.concat()

@@ -1,8 +1,11 @@
 //! The plane t = c through a tet: a triangle or a quad (§II: a frame is a cross-section of the mesh).
 
-use glam::{DVec2, IVec3, Vec3};
+use glam::{DVec2, IVec3, Vec4};
+use wide::{f64x2, f64x4, i32x4};
 
+use super::canvas::ColorSpace;
 use super::interfaces::Faces;
+use super::refiner::FineNode;
 
 /// Edges that the plane crosses, as (corner below, corner above), for each set of corners above (bit i: corner i).
 /// Slices of positive tets turn from +x to +y.
@@ -52,10 +55,108 @@ pub(super) fn cross(below: IVec3, above: IVec3, t: i32) -> (f64, DVec2) {
     (part, low + (high - low) * part)
 }
 
-/// The colour at part of the way along an edge; exact where both ends are equal.
-#[inline]
-pub(super) fn blend(below: Vec3, above: Vec3, part: f64) -> Vec3 {
-    below + (above - below) * part as f32
+/// A corner of a tet as slices see it, in one piece of memory.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(32))]
+pub(super) struct SliceNode {
+    /// In the channels of the canvas.
+    color: Vec4,
+    /// x and y in fine units.
+    place: [i32; 2],
+    /// In fine units.
+    t: i32,
+    /// Whether [`ColorSpace::holds`] does not say so of the colour.
+    is_beyond: bool,
+}
+
+impl SliceNode {
+    pub(super) const ZERO: Self = Self { color: Vec4::ZERO, place: [0; 2], t: 0, is_beyond: false };
+
+    pub(super) fn new(node: &FineNode, space: ColorSpace) -> Self {
+        let (IVec3 { x, y, z }, rgb) = (node.position, node.levels());
+        Self { color: space.of_rgb(rgb), place: [x, y], t: z, is_beyond: !space.holds(rgb) }
+    }
+
+    #[inline]
+    fn place(&self) -> f64x2 {
+        f64x2::new([self.place[0].into(), self.place[1].into()])
+    }
+}
+
+/// A tet's part of a slice: a convex polygon.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Polygon<'a> {
+    /// x and y of the corners in fine units; a triangle's last one stands twice.
+    pub(super) places: [f64x2; 4],
+    /// Corners: 3 or 4.
+    pub(super) count: u8,
+    /// Edges that lie between labels, as far as interfaces are known; bit i: the edge from corner i to the next.
+    pub(super) boundary: u8,
+    /// Whether a colour is beyond what [`ColorSpace::holds`].
+    pub(super) is_beyond: bool,
+    /// For each corner the ends of the tet's edge, below and above, and the part of the way between them.
+    edges: [[&'a SliceNode; 2]; 4],
+    parts: [f64; 4],
+}
+
+impl Polygon<'_> {
+    /// The colours at the corners, in the channels of the canvas.
+    #[inline]
+    pub(super) fn colors(&self) -> [Vec4; 4] {
+        let color = |i: usize| {
+            let [low, high] = [self.edges[i][0].color, self.edges[i][1].color];
+            // Exact where both ends are equal.
+            low + (high - low) * self.parts[i] as f32
+        };
+        [color(0), color(1), color(2), color(3)]
+    }
+}
+
+/// [`SLICES`] of four corners: a triangle's last one twice.
+const PADDED: [[[u8; 2]; 4]; 16] = {
+    let mut padded = [[[0; 2]; 4]; 16];
+    let mut i = 0;
+    while i < 16 * 4 {
+        let (slice, corner) = (SLICES[i / 4], i % 4);
+        if !slice.is_empty() {
+            padded[i / 4][corner] = slice[if corner < slice.len() { corner } else { slice.len() - 1 }];
+        }
+        i += 1;
+    }
+    padded
+};
+
+/// Slices one tet; `None` if the plane does not cut it. Corners are computed as in [`cross`].
+#[inline(always)]
+pub(super) fn slice<'a>(nodes: [&'a SliceNode; 4], t: i32, faces: Faces) -> Option<Polygon<'a>> {
+    let is_above = |i: usize| usize::from(nodes[i].t >= t) << i;
+    let set = is_above(0) | is_above(1) | is_above(2) | is_above(3);
+    let count = SLICES[set].len();
+    if count == 0 {
+        return None;
+    }
+    let ends = |i: usize| {
+        let [below, above] = PADDED[set][i];
+        [nodes[usize::from(below & 3)], nodes[usize::from(above & 3)]]
+    };
+    let edges = [ends(0), ends(1), ends(2), ends(3)];
+    let way = |i: usize| t - edges[i][0].t;
+    let height = |i: usize| edges[i][1].t - edges[i][0].t;
+    let ways = f64x4::from_i32x4(i32x4::new([way(0), way(1), way(2), way(3)]));
+    let heights = f64x4::from_i32x4(i32x4::new([height(0), height(1), height(2), height(3)]));
+    let parts = (ways / heights).to_array();
+    let place = |i: usize| {
+        let [low, high] = [edges[i][0].place(), edges[i][1].place()];
+        low + (high - low) * f64x2::splat(parts[i])
+    };
+    Some(Polygon {
+        places: [place(0), place(1), place(2), place(3)],
+        count: count as u8,
+        boundary: edges_on(SLICES[set], faces),
+        is_beyond: nodes[0].is_beyond | nodes[1].is_beyond | nodes[2].is_beyond | nodes[3].is_beyond,
+        edges,
+        parts,
+    })
 }
 
 #[cfg(test)]

@@ -3,9 +3,11 @@
 use std::ops::Range;
 
 use thiserror::Error;
+use wide::f64x2;
 
 use super::complex::FINE_BITS;
-use super::scan::{GRID_BITS, GridPoint, first_center};
+use super::grid::{GRID_BITS, GridPoint, first_center};
+use super::slice::Polygon;
 use crate::mesh::Domain;
 
 /// The part of the source picture to draw, in source pixels. It is stretched over the whole surface; what lies
@@ -47,7 +49,7 @@ impl Viewport {
     }
 }
 
-/// The map from fine units to the grid of a surface, and the surface's size.
+/// The map from fine units to the pixels of a surface, and the surface's size.
 #[derive(Debug, Clone)]
 pub(super) struct View {
     scale: [f64; 2],
@@ -71,8 +73,7 @@ impl View {
     /// `viewport` of a slab on `domain`, stretched over `width` x `height` pixels.
     pub(super) fn new(domain: &Domain, viewport: Viewport, (width, height): (u32, u32)) -> Self {
         let fine = f64::from(domain.unit()) * f64::from(1 << FINE_BITS);
-        let grid = f64::from(1 << GRID_BITS);
-        let per_pixel = [f64::from(width) * grid / viewport.width, f64::from(height) * grid / viewport.height];
+        let per_pixel = [f64::from(width) / viewport.width, f64::from(height) / viewport.height];
         let mut view = Self {
             scale: per_pixel.map(|scale| scale / fine),
             offset: [viewport.x * per_pixel[0], viewport.y * per_pixel[1]],
@@ -93,12 +94,22 @@ impl View {
     /// Where a point of the slice lies on the surface's grid.
     #[inline]
     pub(super) fn grid(&self, x: f64, y: f64) -> GridPoint {
-        // 2^40 px: beyond what a checked viewport makes of a picture's far corner, and far from overflow.
-        const LIMIT: f64 = (1u64 << 60) as f64;
-        let snap = |v: f64, axis: usize| (v * self.scale[axis] - self.offset[axis]).clamp(-LIMIT, LIMIT) as i64;
-        GridPoint { x: snap(x, 0), y: snap(y, 1) }
+        let snap = |v: f64, axis: usize| (v * self.scale[axis] - self.offset[axis] + SNAP) - SNAP;
+        GridPoint::from_px(snap(x, 0), snap(y, 1))
+    }
+
+    /// The same of a polygon's corners, in pixels.
+    #[inline(always)]
+    pub(super) fn places(&self, polygon: &Polygon<'_>) -> [f64x2; 4] {
+        let (scale, offset, digits) = (f64x2::new(self.scale), f64x2::new(self.offset), f64x2::splat(SNAP));
+        let px = |place: f64x2| (place * scale - offset + digits) - digits;
+        let [a, b, c, d] = polygon.places;
+        [px(a), px(b), px(c), px(d)]
     }
 }
+
+/// Added to it, a number below 2^31 has [`GRID_BITS`] digits after the point left.
+const SNAP: f64 = (3u64 << (51 - GRID_BITS)) as f64;
 
 /// The plane at time `frame` (frames since the slab's first) in fine units: clamped to [half a lattice unit, the slab's
 /// duration], so that it always cuts tets.

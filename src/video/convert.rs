@@ -83,6 +83,13 @@ impl YuvMatrix {
         r * rgb.x + g * rgb.y + b * rgb.z + BLACK
     }
 
+    /// RGB levels from Y, Cb, Cr: the inverse of [`Self::of_levels`], but for the rounding of its coefficients.
+    pub(crate) fn to_levels(self, yuv: Vec3A) -> Vec3A {
+        let [luma, r, gb, gr, b] = self.inverse().map(|coefficient| coefficient as f32 / (1 << BITS) as f32);
+        let [y, cb, cr] = (yuv - Vec3A::from_array(OFFSETS.map(|offset| offset as f32))).to_array();
+        Vec3A::new(y * luma + cr * r, y * luma + cb * gb + cr * gr, y * luma + cb * b)
+    }
+
     /// What luma gives to all channels, then R from Cr, G from Cb, G from Cr, B from Cb.
     const fn inverse(self) -> [i64; 5] {
         let (kr, kb) = self.luma_weights();

@@ -40,7 +40,7 @@ impl TetvecDec {
                 self.push_or_hold(event)
             }
             _ if event.is_serialized() => {
-                self.finish_picture();
+                self.finish_pictures();
                 self.push_or_hold(event)
             }
             _ => self.forward(pad, event),
@@ -126,16 +126,20 @@ impl TetvecDec {
         self.src_pad.push_event(event)
     }
 
-    /// Shows the picture that waits for the next packet. Errors of the flow come back with the next buffer.
-    fn finish_picture(&self) {
-        if let Err(error) = self.show_pending() {
-            gst::debug!(CAT, imp = self, "The last picture ended with {error:?}");
+    /// Shows the pictures of packets that are queued. Errors of the flow come back with the next buffer. What lies
+    /// beyond the end of the segment is decoded all the same, as packets of the next one may depend on it.
+    fn finish_pictures(&self) {
+        while let Err(error) = self.show_queued(0) {
+            gst::debug!(CAT, imp = self, "The last pictures ended with {error:?}");
+            if error != gst::FlowError::Eos {
+                return;
+            }
         }
     }
 
     /// Shows what is left to show. Errors of the flow come back with the next buffer.
     fn drain(&self) {
-        self.finish_picture();
+        self.finish_pictures();
         let group = self.lock_stream().take_gathered();
         if let Err(error) = self.play_group(group) {
             gst::debug!(CAT, imp = self, "Draining ended with {error:?}");

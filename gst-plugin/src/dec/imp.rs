@@ -4,6 +4,7 @@
 //! is held over a push, a query or an event, and never one inside the other.
 
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use gst::glib;
 use gst::prelude::*;
@@ -100,41 +101,34 @@ impl TetvecDec {
     fn chain(&self, packet: gst::Buffer) -> Result<gst::FlowSuccess, gst::FlowError> {
         gst::log!(CAT, imp = self, "Packet {packet:?}");
         self.check_flow()?;
-        let gathered = {
+        let (group, left) = {
             let mut stream = self.lock_stream();
             if stream.key_units_only() && packet.flags().contains(gst::BufferFlags::DELTA_UNIT) {
                 return Ok(gst::FlowSuccess::Ok);
             }
-            (stream.segment.rate() < 0.0).then(|| stream.gather(packet.clone()))
+            if stream.segment.rate() < 0.0 {
+                (Some(stream.gather(packet)), 0)
+            } else {
+                let left = stream.may_wait(&packet);
+                stream.queue(packet);
+                (None, left)
+            }
         };
-        match gathered {
+        let result = match group {
             Some(group) => self.play_group(group),
-            None => self.play_packet(&packet),
-        }
-    }
-
-    fn play_packet(&self, packet: &gst::Buffer) -> Result<gst::FlowSuccess, gst::FlowError> {
-        let pending = self.lock_stream().pending.take();
-        let decoded = match pending {
-            Some(pending) => self.show(pending, Some(packet))?,
-            None => None,
+            None => self.show_queued(left),
         };
-        let decoded = decoded.unwrap_or_else(|| self.lock_stream().decode(packet));
-        let number = match self.judge(packet, decoded) {
-            Decoded::Picture(number) => Some(number),
-            Decoded::Concealed => None,
-            _ => return Ok(gst::FlowSuccess::Ok),
-        };
-        let span = self.lock_stream().admit(packet, number);
-        self.show_all(number, span)
+        self.lock_stream().urgent.asked = Some(Instant::now());
+        result
     }
 
     /// Decodes a group first to last and shows it last to first.
     pub(super) fn play_group(&self, group: Vec<gst::Buffer>) -> Result<gst::FlowSuccess, gst::FlowError> {
         let mut packets = Vec::with_capacity(group.len());
-        for packet in group {
+        group.into_iter().for_each(|packet| self.lock_stream().queue(packet));
+        loop {
             self.check_flow()?;
-            let decoded = self.lock_stream().decode(&packet);
+            let Some((packet, decoded)) = self.lock_stream().receive(0) else { break };
             if let Decoded::Picture(number) = self.judge(&packet, decoded) {
                 packets.push((packet, number));
             }
@@ -143,12 +137,11 @@ impl TetvecDec {
         for (&span, (_, number)) in spans.iter().zip(&packets).rev() {
             self.show_all(Some(*number), span)?;
         }
-        self.show_pending()?;
         Ok(gst::FlowSuccess::Ok)
     }
 
     /// Tells the application of a damaged packet, asks for a keyframe, and finds out whether the loss can be concealed.
-    fn judge(&self, packet: &gst::Buffer, decoded: Decoded) -> Decoded {
+    pub(super) fn judge(&self, packet: &gst::BufferRef, decoded: Decoded) -> Decoded {
         match &decoded {
             Decoded::Picture(_) => {
                 let mut stream = self.lock_stream();

@@ -1,7 +1,7 @@
 //! From a decoded packet to pictures on the source pad: which of them are shown, when, and drawn into what.
 //!
-//! The last picture of a packet waits for the next packet and is drawn while that is decoded; not where packets come
-//! live, and not the first one after a start or a seek.
+//! Packets that come after are decoded while pictures are drawn: some are queued before the first of them is shown, but
+//! none where they come live, or before the first picture after a start or a seek.
 
 use gst::prelude::*;
 use gst::subclass::prelude::*;
@@ -9,49 +9,49 @@ use tetvec::RenderParams;
 
 use super::CAT;
 use super::imp::TetvecDec;
-use super::stream::{Decoded, Pending};
+use super::stream::Decoded;
 use super::timing::{Picture, Span};
 use super::view::Shape;
 
 impl TetvecDec {
-    /// Shows the pictures of a packet, of a lost one where it has no number.
-    pub(super) fn show_all(&self, frame_number: Option<u64>, span: Span) -> Result<gst::FlowSuccess, gst::FlowError> {
+    /// Shows the pictures of queued packets until no more than `left` wait.
+    pub(super) fn show_queued(&self, left: usize) -> Result<gst::FlowSuccess, gst::FlowError> {
         loop {
             self.check_flow()?;
-            // Before each picture, so that the times are those of the rate that downstream takes.
-            self.negotiate_if_needed()?;
-            let Some(picture) = self.lock_stream().next_picture(span) else { break };
-            self.show_pending()?;
-            let at_once = {
-                let mut stream = self.lock_stream();
-                let frame = frame_number.map(|number| number as f64 + picture.position);
-                stream.pending = Some(Pending { frame, picture });
-                stream.segment.rate() < 0.0 || stream.urgent.live || std::mem::take(&mut stream.urgent.first)
+            let Some((packet, decoded)) = self.lock_stream().receive(left) else { break };
+            let number = match self.judge(&packet, decoded) {
+                Decoded::Picture(number) => Some(number),
+                Decoded::Concealed => None,
+                _ => continue,
             };
-            if at_once {
-                self.show_pending()?;
-            }
+            let span = self.lock_stream().admit(&packet, number);
+            self.show_all(number, span)?;
         }
         Ok(gst::FlowSuccess::Ok)
     }
 
-    /// Shows the picture that waits, if there is one.
-    pub(super) fn show_pending(&self) -> Result<(), gst::FlowError> {
-        let pending = self.lock_stream().pending.take();
-        pending.map_or(Ok(()), |pending| self.show(pending, None).map(|_| ()))
+    /// Shows the pictures of a packet, of a lost one where it has no number.
+    pub(super) fn show_all(&self, frame_number: Option<u64>, span: Span) -> Result<(), gst::FlowError> {
+        loop {
+            self.check_flow()?;
+            // Before each picture, so that the times are those of the rate that downstream takes, and no picture is drawn
+            // at a size that it no longer takes.
+            self.negotiate_if_needed()?;
+            let Some(picture) = self.lock_stream().next_picture(span) else { break };
+            self.show(frame_number.map(|number| number as f64 + picture.position), picture)?;
+        }
+        Ok(())
     }
 
-    /// Draws a picture and sends it, unless the segment or QoS forbid. `next` is decoded meanwhile; `None` is what became
-    /// of it where no picture was drawn.
-    pub(super) fn show(&self, pending: Pending, next: Option<&gst::Buffer>) -> Result<Option<Decoded>, gst::FlowError> {
-        self.check_flow()?;
-        // So that no picture is drawn at a size that downstream no longer takes.
-        self.negotiate_if_needed()?;
+    /// Draws a picture and sends it, unless the segment or QoS forbid. `frame` is its number, with the part that has
+    /// passed since; `None` for one in place of a lost one.
+    fn show(&self, frame: Option<f64>, picture: Picture) -> Result<(), gst::FlowError> {
         let segment = self.lock_stream().segment.clone();
-        let Some((time, duration)) = clip(&segment, pending.picture)? else { return Ok(None) };
+        let Some((time, duration)) = clip(&segment, picture)? else { return Ok(()) };
         if self.is_late(&segment, time, duration) {
-            self.lock_stream().discont = true;
-            return Ok(None);
+            let mut stream = self.lock_stream();
+            (stream.discont, stream.urgent.first) = (true, false);
+            return Ok(());
         }
         if let Some(stream_time) = segment.to_stream_time(time) {
             // Only of interest to those who control properties.
@@ -60,38 +60,38 @@ impl TetvecDec {
         let output = self.lock_output().output.clone().ok_or(gst::FlowError::NotNegotiated)?;
         let buffer = output.pool.acquire_buffer(None)?;
         let view = self.view();
-        let mut decoded = None;
         let drawn = output.draw(buffer, |surface| {
             let mut stream = self.lock_stream();
             let params = RenderParams {
                 // Beyond the last frame that came stands the last picture of it.
-                frame: pending.frame.unwrap_or(f64::INFINITY),
+                frame: frame.unwrap_or(f64::INFINITY),
                 viewport: stream.source.and_then(|source| view.viewport(source, Shape::of(&output.info))),
                 mesh: view.mesh,
             };
-            let Some(next) = next else { return stream.render(&params, surface) };
-            let (drawn, next) = stream.render_and_decode(&params, surface, next);
-            decoded = Some(next);
-            drawn
+            stream.render(&params, surface)
         });
         let mut buffer = drawn.map_err(|error| {
             error.log_with_object(&*self.obj());
             gst::element_imp_error!(self, gst::StreamError::Decode, ("Cannot draw a picture"), ["{error:?}"]);
             gst::FlowError::Error
         })?;
-        let discont = std::mem::take(&mut self.lock_stream().discont);
+        let discont = {
+            let mut stream = self.lock_stream();
+            stream.urgent.first = false;
+            std::mem::take(&mut stream.discont)
+        };
         let header = buffer.make_mut();
         header.set_pts(time);
         header.set_duration(duration);
         if discont {
             header.set_flags(gst::BufferFlags::DISCONT);
         }
-        if pending.frame.is_none() {
+        if frame.is_none() {
             header.set_flags(gst::BufferFlags::CORRUPTED);
         }
         self.src_pad.push(buffer)?;
         gst::log!(CAT, imp = self, "Shown at {time}");
-        Ok(decoded)
+        Ok(())
     }
 
     /// Whether a picture comes too late to be worth drawing; the application is told of it.

@@ -1,6 +1,9 @@
 //! What the streaming thread knows between two buffers: the segment, the decoder, the schedule, and events that wait for
 //! caps. Every operation is short and calls no pad, so that its lock is never held over a push, a query or an event.
 
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
 use gst::ClockTime;
 use gst::prelude::*;
 use tetvec::{DecodeError, Decoder, DecoderConfig, PacketInfo, RenderParams, SequenceHeader, Surface};
@@ -24,29 +27,28 @@ pub(super) enum Decoded {
     Damaged(String),
 }
 
-/// Why a picture should not wait for the next packet.
+/// Packets that wait for their turn to be shown, and are decoded meanwhile. A keyframe's packet takes as long as seven
+/// to ten others: so many are decoded ahead of it while the pictures before it are drawn.
+const AHEAD: usize = 12;
+
+/// If upstream takes longer than this for its next packet, it has none in store.
+const IN_STORE: Duration = Duration::from_millis(5);
+
+/// Why pictures should not wait for packets that come after theirs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Urgency {
     /// Upstream is live: the next packet comes when its time has come.
     pub(super) live: bool,
     /// None has been shown since the start or a seek.
     pub(super) first: bool,
+    /// When the last packet was done with.
+    pub(super) asked: Option<Instant>,
 }
 
 impl Default for Urgency {
     fn default() -> Self {
-        Self { live: false, first: true }
+        Self { live: false, first: true, asked: None }
     }
-}
-
-const UNREADABLE: &str = "the packet's memory cannot be read";
-
-/// A picture that is drawn when the next packet comes, so that both cores work: one draws, one decodes.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Pending {
-    /// Frame number, fractions between frames; `None` for one in place of a lost one.
-    pub(super) frame: Option<f64>,
-    pub(super) picture: Picture,
 }
 
 /// The state of one stream.
@@ -63,8 +65,8 @@ pub(super) struct Stream {
     pub(super) after_loss: bool,
     /// Pictures leave at once: packets come when they are made, or none has left since the start or a seek.
     pub(super) urgent: Urgency,
-    /// The picture that waits for the next packet.
-    pub(super) pending: Option<Pending>,
+    /// Packets that the decoder has queued, in order.
+    queued: VecDeque<gst::Buffer>,
     /// A keyframe has been asked for since the last one came.
     keyframe_requested: bool,
     /// Packets that should have given a picture since the start or a flush.
@@ -88,7 +90,7 @@ impl Stream {
             discont: true,
             after_loss: false,
             urgent: Urgency::default(),
-            pending: None,
+            queued: VecDeque::new(),
             keyframe_requested: false,
             packets: 0,
             decoded: 0,
@@ -106,7 +108,7 @@ impl Stream {
         self.discont = true;
         self.after_loss = false;
         self.urgent.first = true;
-        self.pending = None;
+        self.queued.clear();
         self.keyframe_requested = false;
         (self.packets, self.decoded) = (0, 0);
         self.decoder.flush();
@@ -158,29 +160,31 @@ impl Stream {
         self.gop.take()
     }
 
-    /// Decodes a packet.
-    pub(super) fn decode(&mut self, packet: &gst::BufferRef) -> Decoded {
-        match packet.map_readable() {
-            Ok(map) => {
-                let result = self.decoder.send_packet(&map);
-                self.take(result)
-            }
-            Err(_) => Decoded::Damaged(UNREADABLE.into()),
-        }
+    /// Queues a packet.
+    pub(super) fn queue(&mut self, packet: gst::Buffer) {
+        // What cannot be read is a packet without bytes, which is damaged.
+        let data = packet.map_readable().map_or_else(|_| Vec::new(), |map| map.to_vec());
+        self.decoder.queue_packet(data);
+        self.queued.push_back(packet);
     }
 
-    /// Draws a picture and decodes the packet after it at the same time.
-    pub(super) fn render_and_decode(
-        &mut self,
-        params: &RenderParams,
-        surface: &mut Surface<'_>,
-        packet: &gst::BufferRef,
-    ) -> (Result<(), DecodeError>, Decoded) {
-        let Ok(map) = packet.map_readable() else {
-            return (self.render(params, surface), Decoded::Damaged(UNREADABLE.into()));
-        };
-        let (drawn, result) = self.decoder.render_and_send(params, surface, &map);
-        (drawn, self.take(result))
+    /// The oldest packet if more than `left` are queued, and what became of it.
+    pub(super) fn receive(&mut self, left: usize) -> Option<(gst::Buffer, Decoded)> {
+        if self.queued.len() <= left {
+            return None;
+        }
+        let packet = self.queued.pop_front()?;
+        let result = self.decoder.receive_packet()?;
+        Some((packet, self.take(result)))
+    }
+
+    /// How many packets may wait behind `packet`, which has just come: none where its picture is waited for.
+    pub(super) fn may_wait(&self, packet: &gst::BufferRef) -> usize {
+        let Urgency { live, first, asked } = self.urgent;
+        let end = packet.pts().and_then(|pts| pts.checked_add(packet.duration().unwrap_or(ClockTime::ZERO)));
+        let is_before = matches!((end, self.segment.start()), (Some(end), Some(start)) if end <= start);
+        let in_store = asked.is_some_and(|asked| asked.elapsed() <= IN_STORE);
+        if live || (first && !is_before) || !in_store { 0 } else { AHEAD }
     }
 
     /// What the decoder made of a packet.

@@ -122,7 +122,9 @@ impl Running {
         let collected = Arc::clone(&samples);
         let callbacks = gst_app::AppSinkCallbacks::builder().new_sample(move |sink| {
             let sample = sink.pull_sample().map_err(|_| gst::FlowError::Eos)?;
-            collected.lock().expect("no test panics here").push(sample);
+            // A copy: where a flush takes a CAPS event out of its queue, appsink writes the pad's caps into the sample
+            // that it handed out last, which it must not if others hold it (GStreamer 1.22).
+            collected.lock().expect("no test panics here").push(sample.copy());
             Ok(gst::FlowSuccess::Ok)
         });
         sink.set_callbacks(callbacks.build());

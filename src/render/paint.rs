@@ -1,0 +1,171 @@
+//! Pieces to pixels: bands of rows, each painted whole in the order of pieces, then packed.
+//!
+//! Bands are independent, and within a band the order is that of control tets and children: so threads cannot change
+//! a picture.
+
+use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
+
+use super::canvas::{Canvas, ColorSpace};
+use super::crossed::Crossed;
+use super::draw::{Piece, Pieces};
+use super::pack::{BAND_ROWS, Band, bands};
+use super::parallel::for_each;
+use super::scan::{Edges, Outline, ROWS};
+use super::scene::CHUNK;
+use super::view::View;
+use crate::video::Surface;
+
+/// Pieces that are fetched at a time.
+const BATCH: usize = 16;
+
+/// What a band is painted with; reused from band to band and from picture to picture.
+#[derive(Debug)]
+struct Painter {
+    canvas: Canvas,
+    crossed: Crossed,
+    /// A row of chroma.
+    chroma: Vec<[u8; 2]>,
+}
+
+/// Painters that no thread is using.
+#[derive(Debug, Default)]
+pub(super) struct Painters(Mutex<Vec<Painter>>);
+
+impl Painters {
+    fn with(&self, work: impl FnOnce(&mut Painter)) {
+        let free = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let new = || Painter { canvas: Canvas::new(), crossed: Crossed::default(), chroma: Vec::new() };
+        let mut painter = free.unwrap_or_else(new);
+        work(&mut painter);
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(painter);
+    }
+}
+
+/// All that is painted.
+pub(super) struct Picture<'a> {
+    pub(super) view: &'a View,
+    pub(super) antialias: bool,
+    pub(super) lists: &'a [Pieces],
+    /// Polygons whose edges are drawn over the rest, and the number of their corners.
+    pub(super) outlines: &'a [Vec<(Outline, u8)>],
+}
+
+impl<'a> Picture<'a> {
+    /// Paints all bands.
+    pub(super) fn paint(&self, painters: &Painters, surface: &mut Surface<'_>) {
+        let by_band = BandTable::new(self.lists, self.view.rows as usize);
+        for_each(bands(surface), |mut band| {
+            let names = by_band.row(band.index());
+            painters.with(|painter| painter.paint(self, names, &mut band));
+        });
+    }
+
+    fn named(&self, names: &'a [u32]) -> impl Iterator<Item = (&'a Pieces, usize)> + Clone {
+        let lists = self.lists;
+        names.iter().map(move |&name| (&lists[(name >> NAME_BITS) as usize], name as usize & ((1 << NAME_BITS) - 1)))
+    }
+}
+
+impl Painter {
+    /// Paints a band, which the named pieces touch.
+    fn paint<'a>(&mut self, picture: &Picture<'a>, names: &'a [u32], band: &mut Band<'_>) {
+        let Self { canvas, crossed, chroma } = self;
+        let (rows, space) = (band.rows(), band.space());
+        canvas.start(space, picture.view.columns as usize, rows.len());
+        for names in names.chunks(BATCH) {
+            // Pieces lie far apart: fetched in one go, the waits for them overlap.
+            let mut pieces = [Piece::NOTHING; BATCH];
+            let mut outlines = [Outline::NOTHING; BATCH];
+            for (piece, (list, place)) in pieces.iter_mut().zip(picture.named(names)) {
+                *piece = list.pieces[place];
+            }
+            for ((outline, piece), (list, _)) in outlines.iter_mut().zip(&pieces).zip(picture.named(names)) {
+                if let Some(number) = piece.tall() {
+                    *outline = list.tall[number];
+                }
+            }
+            for (piece, outline) in pieces[..names.len()].iter().zip(outlines) {
+                paint_piece(canvas, space, &rows, piece, outline);
+            }
+        }
+        if picture.antialias {
+            let patches = picture.named(names).map(|(list, place)| &list.patches[place]);
+            let edges = patches.clone().map(|patch| (&patch.outline, patch.count, patch.boundary));
+            crossed.start(picture.view, rows.clone(), edges);
+            for patch in patches {
+                crossed.add(&patch.outline, patch.count, &patch.colors, space);
+            }
+            crossed.paint(canvas);
+        }
+        if !picture.outlines.is_empty() {
+            const ALL_EDGES: u8 = 0b1111;
+            let outlines = picture.outlines.iter().flatten().map(|(outline, count)| (outline, *count, ALL_EDGES));
+            crossed.start(picture.view, rows, outlines);
+            crossed.places().for_each(|[column, row]| canvas.set_apart(column, row));
+        }
+        band.pack(canvas, chroma);
+    }
+}
+
+/// Paints what of a piece lies in the `rows` of a canvas. `outline` counts where it is tall.
+#[inline(always)]
+fn paint_piece(canvas: &mut Canvas, space: ColorSpace, rows: &Range<i32>, piece: &Piece, outline: Outline) {
+    let own = piece.rows();
+    let (first, end) = (own.start.max(rows.start), own.end.min(rows.end));
+    let width = canvas.width() as i32;
+    let mut brush = piece.run.brush(space, first);
+    let mut lines = canvas.rows_mut((first - rows.start) as usize);
+    if piece.tall().is_none() {
+        // The table of bands names pieces in bands that they have rows in.
+        let cover = piece.cover.get((first - own.start) as usize..(end - own.start) as usize).unwrap_or_default();
+        return cover.iter().zip(&mut lines).for_each(|(span, pixels)| brush.paint(pixels, *span));
+    }
+    let edges = Edges::new(outline);
+    for row in (first..end).step_by(ROWS) {
+        let count = ROWS.min((end - row) as usize);
+        edges.spans(row, width)[..count].iter().zip(&mut lines).for_each(|(span, pixels)| brush.paint(pixels, *span));
+    }
+}
+
+/// Low bits of a polygon's name: its place in its list; the others number the list.
+const NAME_BITS: u32 = 14;
+// A tet has up to eight children in the slice, each cut into up to two triangles.
+const _: () = assert!(CHUNK * 16 <= 1 << NAME_BITS);
+
+/// Names of the polygons that touch each band, ascending, as compressed rows.
+struct BandTable {
+    start: Vec<u32>,
+    names: Vec<u32>,
+}
+
+impl BandTable {
+    fn new(lists: &[Pieces], rows: usize) -> Self {
+        let bands_of = |rows: &[u16; 2]| {
+            let [first, end] = rows.map(usize::from);
+            first / BAND_ROWS..(end - 1) / BAND_ROWS + 1
+        };
+        let mut start = vec![0u32; rows.div_ceil(BAND_ROWS) + 1];
+        for rows in lists.iter().flat_map(|list| &list.rows) {
+            bands_of(rows).for_each(|band| start[band + 1] += 1);
+        }
+        for band in 1..start.len() {
+            start[band] += start[band - 1];
+        }
+        let mut next = start.clone();
+        let mut names = vec![0; start[start.len() - 1] as usize];
+        for (number, list) in lists.iter().enumerate() {
+            for (place, rows) in list.rows.iter().enumerate() {
+                for band in bands_of(rows) {
+                    names[next[band] as usize] = (number << NAME_BITS | place) as u32;
+                    next[band] += 1;
+                }
+            }
+        }
+        Self { start, names }
+    }
+
+    fn row(&self, band: usize) -> &[u32] {
+        &self.names[self.start[band] as usize..self.start[band + 1] as usize]
+    }
+}
