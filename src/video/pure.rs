@@ -169,7 +169,8 @@ mod tests {
 
     #[test]
     fn rims_are_as_the_inside() {
-        let frame = Frame::from_fn(16, 8, |x, _| [[10, 90, 200][usize::from(x > 6) + usize::from(x > 7)]; 3]).expect("size");
+        let frame =
+            Frame::from_fn(16, 8, |x, _| [[10, 90, 200][usize::from(x > 6) + usize::from(x > 7)]; 3]).expect("size");
         let labels = (0..128).map(|n| Label(u32::from(n % 16 > 6))).collect();
         let pure = pure_colors(&frame, &LabelPlane::new(16, 8, labels));
         assert_eq!([pure.pixel(6, 4), pure.pixel(7, 4), pure.pixel(8, 4)], [[10; 3], [200; 3], [200; 3]]);

@@ -80,11 +80,6 @@ impl Mixed {
         self.follow(boundaries.values().filter(|boundary| boundary.jump() >= jump), raster);
     }
 
-    /// Whether colours usually jump within a pixel.
-    pub(super) fn is_sharp(self) -> bool {
-        self.sides > 0.0 && self.sum <= WIDEST * self.sides
-    }
-
     /// Takes boundaries in. All together weigh as much as a boundary around the picture, the last frames most.
     fn follow<'a>(&mut self, boundaries: impl Iterator<Item = &'a Boundary>, raster: Raster) {
         for boundary in boundaries {

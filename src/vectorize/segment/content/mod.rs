@@ -84,11 +84,13 @@ impl Content {
         let jump = (NOISE_JUMP * zones.roughness(self.raster, frame)).clamp(LEAST_JUMP, self.params.jump_levels);
         let mut pixels = unmix(self.raster, frame, &zones);
         self.usual.learn(self.raster, &pixels, jump);
-        if self.usual.is_sharp() {
-            pixels = unmix_with_inks(self.raster, frame, zones);
-        }
         let rules = MergeRules { jump, min_area: self.params.min_area_px, worth: self.params.jump_levels };
-        let regions = merge(self.raster, &mut pixels, rules, self.usual);
+        let mut regions = merge(self.raster, &mut pixels, rules, self.usual);
+        // What comes to one region is no drawing.
+        if regions.areas.len() > 1 {
+            pixels = unmix_with_inks(self.raster, frame, zones);
+            regions = merge(self.raster, &mut pixels, rules, self.usual);
+        }
         let levels = pyramid(frame);
         let plane = match &self.before {
             // Whatever moved, there is nothing that a name would tell apart.
