@@ -4,7 +4,6 @@
 //! floating point, and any order that depends on more than the order of calls.
 
 use glam::IVec3;
-use wide::i32x4;
 
 use super::vertices::Vertices;
 use crate::mesh::VertexId;
@@ -12,26 +11,23 @@ use crate::mesh::VertexId;
 /// Extents are counted in this part of a lattice unit.
 pub(crate) const PARTS: i32 = 16;
 
-/// Takes a tet into the running means of the extents of the edges at its corners, in 1/16 lattice units; they are 0
-/// before the first.
+/// Takes the edges from a tet's gate to its apex, its last corner, into the running means of the extents of the edges at
+/// its corners, in 1/16 lattice units; they are 0 before the first.
+#[inline]
 pub(super) fn learn(vertices: &mut Vertices, corners: [VertexId; 4], positions: [IVec3; 4]) {
-    let [a, b, c, d] = positions.map(lanes);
-    let [ab, ac, ad] = [(b - a).abs(), (c - a).abs(), (d - a).abs()];
-    let [bc, bd, cd] = [(c - b).abs(), (d - b).abs(), (d - c).abs()];
-    let around = [ab + ac + ad, ab + bc + bd, ac + bc + cd, ad + bd + cd];
-    for (vertex, sum) in corners.into_iter().zip(around) {
-        // A third, exact for what is not negative.
-        let here = (sum * i32x4::splat(PARTS)).mul_keep_high(i32x4::splat(0x5555_5556));
+    let [first, second, third, apex] = positions;
+    let [a, b, c] = [first, second, third].map(|position| PARTS * (apex - position).abs());
+    for (vertex, here) in corners.into_iter().zip([a, b, c]) {
         let mean = &mut vertices[vertex].extent;
-        let known = lanes(*mean);
-        let next = if *mean == IVec3::ZERO { here } else { known + ((here - known) >> 2) };
-        let [x, y, t, _] = next.to_array();
-        *mean = IVec3::new(x, y, t);
+        *mean = if *mean == IVec3::ZERO { here } else { *mean + ((here - *mean) >> 3) };
     }
-}
-
-fn lanes(v: IVec3) -> i32x4 {
-    i32x4::new([v.x, v.y, v.z, 0])
+    let mean = &mut vertices[corners[3]].extent;
+    if *mean == IVec3::ZERO {
+        // A third, exact for what is not negative.
+        let third = |sum: i32| ((i64::from(sum) * 0x5555_5556) >> 32) as i32;
+        let sum = a + b + c;
+        *mean = IVec3::new(third(sum.x), third(sum.y), third(sum.z));
+    }
 }
 
 /// The sum over three vertices, at least that of a lattice unit.

@@ -37,6 +37,8 @@ pub(super) struct Source {
     source_wedge: Vec<WedgeId>,
     /// Stream numbers of labels.
     labels: BTreeMap<Label, u32>,
+    /// Whether all tets have one label.
+    is_uniform: bool,
 }
 
 impl Source {
@@ -51,6 +53,7 @@ impl Source {
             source_tet: Vec::new(),
             source_wedge: Vec::new(),
             labels: BTreeMap::new(),
+            is_uniform: true,
         }
     }
 
@@ -69,6 +72,7 @@ impl Source {
         self.coded_vertex.resize(mesh.positions.len(), NONE);
         for tet in known..mesh.tets.len() {
             check_tet(mesh, tet)?;
+            self.is_uniform &= mesh.tet_label(tet) == mesh.tet_label(0);
             self.neighbours.push([NONE; 4]);
             self.is_coded.push(false);
             self.pending.push(tet as u32);
@@ -214,6 +218,10 @@ impl Side for Writing<'_> {
     fn vertex_coded(&mut self, id: VertexId) {
         self.source.coded_vertex[self.vertex.index()] = id.0;
         self.source.source_vertex.push(self.vertex);
+    }
+
+    fn is_uniform(&self) -> bool {
+        self.source.is_uniform
     }
 
     fn label(&mut self, count: u32) -> u32 {
