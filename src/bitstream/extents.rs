@@ -1,6 +1,6 @@
 //! How long edges are around each vertex, axis by axis: the scale in which the mesh is about as dense everywhere.
 //!
-//! In: tets as they are coded. Out: typical extents, the unit of distances, angles and residuals there. Forbidden here:
+//! In: tets behind gates, as they are coded. Out: typical extents, the unit of distances, angles and residuals there. Forbidden here:
 //! floating point, and any order that depends on more than the order of calls.
 
 use glam::IVec3;
@@ -44,19 +44,24 @@ pub(crate) fn size_of(extents: IVec3) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bitstream::front::Corner;
 
     #[test]
     fn means_follow_the_tets() {
         let mut vertices = Vertices::default();
-        (0..4).for_each(|_| vertices.push(IVec3::ZERO, 0));
+        (0..4).for_each(|_| vertices.push(IVec3::ZERO, 0, Corner::NONE));
         let corners = [0, 1, 2, 3].map(VertexId);
         assert_eq!(around(&vertices, [corners[0]; 3]), IVec3::splat(48));
         assert_eq!(size_of(vertices[corners[0]].extent), 0);
         let at = [[0, 0, 0], [30, 0, 0], [0, 60, 0], [0, 0, 90]].map(IVec3::from_array);
         learn(&mut vertices, corners, at);
-        assert_eq!(vertices[corners[0]].extent, IVec3::new(160, 320, 480));
-        assert_eq!(size_of(vertices[corners[0]].extent), 24);
+        let extents = |vertices: &Vertices| corners.map(|v| vertices[v].extent);
+        let gate = [[0, 0, 1440], [480, 0, 1440], [0, 960, 1440]].map(IVec3::from_array);
+        assert_eq!(extents(&vertices)[..3], gate);
+        assert_eq!(extents(&vertices)[3], IVec3::new(160, 320, 1440));
+        assert_eq!(size_of(vertices[corners[3]].extent), 26);
         learn(&mut vertices, corners, at.map(|p| p * 2));
-        assert_eq!(vertices[corners[0]].extent, IVec3::new(200, 400, 600));
+        assert_eq!(extents(&vertices)[1], IVec3::new(540, 0, 1620));
+        assert_eq!(extents(&vertices)[3], IVec3::new(160, 320, 1440));
     }
 }

@@ -35,7 +35,7 @@ impl Neighbours {
         }
     }
 
-    /// Older neighbours of a wedge, as often as they were listed.
+    /// Older neighbours of a wedge as often as they were listed, the last ones first.
     #[inline]
     pub(super) fn of(&self, wedge: u32) -> impl Iterator<Item = u32> + '_ {
         let mut entry = self.last[(wedge - self.first) as usize];
@@ -51,5 +51,27 @@ impl Neighbours {
         self.first = count;
         self.last.clear();
         self.entries.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_older_wedge_is_listed_with_the_younger_one() {
+        let mut neighbours = Neighbours::default();
+        (0..4).for_each(|_| neighbours.push_wedge());
+        for [one, other] in [[0, 2], [2, 1], [3, 0], [2, 0]] {
+            neighbours.push(one, other);
+        }
+        assert!(neighbours.of(2).eq([0, 1, 0]));
+        assert!(neighbours.of(3).eq([0]));
+        assert_eq!(neighbours.of(0).next(), None);
+        neighbours.clear(4);
+        neighbours.push_wedge();
+        neighbours.push(4, 3);
+        neighbours.push(1, 2);
+        assert!(neighbours.of(4).eq([3]));
     }
 }

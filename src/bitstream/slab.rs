@@ -90,8 +90,8 @@ pub(super) struct Slab {
     models: Box<Models>,
     /// Whether tets of the current packet that lie behind a gate have the label before it.
     is_uniform: bool,
-    /// Last wedge of each label.
-    last_wedge: Vec<u32>,
+    /// Number of labels.
+    labels: u32,
     /// Per wedge the next older one of its vertex.
     wedge_next: Vec<u32>,
     vertices: Vertices,
@@ -152,7 +152,7 @@ impl Slab {
                 seed_known: BitModel::NEW,
             }),
             is_uniform: false,
-            last_wedge: Vec::new(),
+            labels: 0,
             wedge_next: Vec::new(),
             vertices: Vertices::default(),
             stars: Stars::default(),

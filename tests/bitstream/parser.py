@@ -589,7 +589,7 @@ class Slab:
         return self.labels - 1
 
     def parse_color(self, wedge):
-        around = self.neighbours.get(wedge, [])
+        around = self.neighbours.get(wedge, [])[-256:]
         known = [(self.colors[w], self.misses[w]) for w in around]
         if not known and wedge:
             known = [(self.colors[wedge - 1], (0, 0))]

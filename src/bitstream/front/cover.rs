@@ -246,3 +246,128 @@ fn side_normal(vertices: &Vertices, tet: &NewTet, [a, b, c]: [usize; 3]) -> Vec3
     let extent = extents::around(vertices, [tet.corners[a], tet.corners[b], tet.corners[c]]);
     unit_normal(plane([tet.positions[a], tet.positions[b], tet.positions[c]]), extent)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::mesh::FACES;
+
+    const CELLS: i32 = 3;
+
+    fn vertex([x, y, z]: [i32; 3]) -> VertexId {
+        VertexId((x + (CELLS + 1) * (y + (CELLS + 1) * z)) as u32)
+    }
+
+    /// Positive tets of a cube of cells, six each around a diagonal.
+    fn cube() -> (Vec<IVec3>, Vec<[VertexId; 4]>) {
+        let side = 0..=CELLS;
+        let positions = side.clone().flat_map(|z| {
+            let side = side.clone();
+            side.clone().flat_map(move |y| side.clone().map(move |x| IVec3::new(x, y, z)))
+        });
+        let mut tets = Vec::new();
+        for cell in 0..CELLS.pow(3) {
+            let origin = [cell % CELLS, cell / CELLS % CELLS, cell / CELLS / CELLS];
+            for (axes, is_even) in [
+                ([0, 1, 2], true),
+                ([1, 2, 0], true),
+                ([2, 0, 1], true),
+                ([0, 2, 1], false),
+                ([1, 0, 2], false),
+                ([2, 1, 0], false),
+            ] {
+                let mut at = origin;
+                let mut corners = [vertex(at); 4];
+                for (corner, axis) in corners[1..].iter_mut().zip(axes) {
+                    at[axis] += 1;
+                    *corner = vertex(at);
+                }
+                let [a, b, c, d] = corners;
+                tets.push(if is_even { [a, b, c, d] } else { [a, b, d, c] });
+            }
+        }
+        (positions.collect(), tets)
+    }
+
+    /// The face turned so that its lowest vertex comes first.
+    fn turned(corners: [VertexId; 3]) -> [VertexId; 3] {
+        let [a, b, c] = corners;
+        [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap_or(corners)
+    }
+
+    /// Every open face is listed at its three vertices, and partners are mutual and run opposite ways.
+    fn open_faces(front: &Front, vertices: &Vertices) -> BTreeSet<[VertexId; 3]> {
+        let mut faces = BTreeSet::new();
+        let mut corners = 0;
+        for vertex in (0..vertices.len() as u32).map(VertexId) {
+            for corner in front.at(vertices, vertex) {
+                assert_eq!(front.vertex(corner), vertex);
+                let partner = front.across(corner);
+                if partner.is_some() {
+                    assert_eq!(front.across(partner), corner);
+                    assert_eq!(front.vertex(partner.next()), vertex);
+                    assert_eq!(front.vertex(partner), front.vertex(corner.next()));
+                }
+                faces.insert(turned(front.vertices_from(corner)));
+                corners += 1;
+            }
+        }
+        assert_eq!(corners, 3 * faces.len());
+        faces
+    }
+
+    /// The open face with these corners.
+    fn find(front: &Front, vertices: &Vertices, [a, b, c]: [VertexId; 3]) -> Option<Corner> {
+        front.at(vertices, a).find(|&corner| front.vertices_from(corner) == [a, b, c])
+    }
+
+    /// Tets in whatever order, behind whatever face: the front is what a plain set of faces says.
+    #[test]
+    fn the_front_is_the_boundary_of_what_is_coded() {
+        let (positions, mut left) = cube();
+        let mut seed = 5u64;
+        let mut random = |end: usize| {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 33) as usize % end
+        };
+        // Miri is a thousand times slower.
+        left.truncate(if cfg!(miri) { 20 } else { left.len() });
+        let (mut front, mut vertices) = (Front::new(), Vertices::default());
+        positions.iter().for_each(|&position| vertices.push(position, 0, front.push_list()));
+        let mut expected = BTreeSet::new();
+        while !left.is_empty() {
+            let corners = left.swap_remove(random(left.len()));
+            let behind = FACES.into_iter().enumerate().find_map(|(face, [a, b, c])| {
+                // Seen from before the gate.
+                let [a, b, c] = [a, c, b].map(|corner| corners[corner]);
+                find(&front, &vertices, [a, b, c]).map(|gate| ([a, b, c, corners[face]], gate))
+            });
+            let [a, b, c, d] = corners;
+            let corners = behind.map_or([a, b, c, d], |(corners, _)| corners);
+            let tet = NewTet {
+                number: 0,
+                label: 0,
+                corners,
+                positions: corners.map(|v| vertices.position(v)),
+                sides: [0; 4],
+            };
+            let (gate, met) = match behind {
+                Some((_, gate)) => (gate, front.meet(&vertices, corners, gate)),
+                None => (front.sow(&vertices, &tet), Met::NOTHING),
+            };
+            front.cover(&vertices, &tet, gate, &met).expect("faces that are not there");
+            for face in FACES {
+                let [a, b, c] = face.map(|corner| corners[corner]);
+                if !expected.remove(&turned([a, c, b])) {
+                    expected.insert(turned([a, b, c]));
+                }
+            }
+            let open = open_faces(&front, &vertices);
+            // Faces that meet unseen stay open on both sides.
+            let seen = open.iter().filter(|&&[a, b, c]| !open.contains(&turned([a, c, b]))).copied();
+            assert!(seen.eq(expected.iter().copied()));
+        }
+    }
+}

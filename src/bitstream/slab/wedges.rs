@@ -21,6 +21,9 @@ const MAX_WEDGES_A_VERTEX: u16 = 1 << 8;
 /// Wedges of a corner that are looked at to find candidates for a label.
 const LABEL_SCAN: usize = 8;
 
+/// Neighbours of a wedge that its colour is predicted from, at most.
+const NEIGHBOUR_SCAN: usize = 256;
+
 /// The edges of a tet, by its corners.
 const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
@@ -43,7 +46,7 @@ impl Slab {
         if let Some(before) = before.filter(|_| self.is_uniform) {
             return Ok(before);
         }
-        let count = self.last_wedge.len() as u32;
+        let count = self.labels;
         let truth = side.label(count);
         if let Some(before) = before {
             let context = self.label_context(corners, before, closed);
@@ -112,15 +115,6 @@ impl Slab {
         })
     }
 
-    /// The wedge of `vertex` that has this label.
-    fn wedge_of(&self, vertex: VertexId, label: u32) -> Option<u32> {
-        let known = self.vertices[vertex].wedges;
-        if known.count > 0 && known.label == label {
-            return Some(known.youngest);
-        }
-        self.wedges_at(vertex).find(|&(_, other)| other == label).map(|(wedge, _)| wedge)
-    }
-
     /// The tet's wedges; those that do not exist yet are made.
     #[inline]
     pub(super) fn code_wedges(
@@ -164,17 +158,14 @@ impl Slab {
         self.wedge_next.push(known.youngest);
         self.neighbours.push_wedge();
         *known = Wedges { youngest: wedge.0, label, count: known.count + 1 };
-        match self.last_wedge.get_mut(label as usize) {
-            Some(last) => *last = wedge.0,
-            None => self.last_wedge.push(wedge.0),
-        }
+        self.labels = self.labels.max(label + 1);
         Ok(wedge.0)
     }
 
     /// Labels before the faces that a tet closes but for the gate.
     #[inline]
     pub(super) fn closed_labels(&self, met: &Met) -> [Option<u32>; 3] {
-        if self.last_wedge.len() == 1 {
+        if self.labels == 1 {
             return met.closed.map(|face| face.is_some().then_some(0));
         }
         met.closed.map(|face| face.is_some().then(|| self.front.before(face).label))
@@ -214,7 +205,7 @@ impl Slab {
     /// What the colour of the next wedge is predicted from.
     fn around(&self, wedge: usize) -> Around {
         let mut around = Around::default();
-        for other in self.neighbours.of(wedge as u32) {
+        for other in self.neighbours.of(wedge as u32).take(NEIGHBOUR_SCAN) {
             around.add(self.known[other as usize]);
         }
         if around.is_empty() && wedge > 0 {
