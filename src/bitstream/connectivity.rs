@@ -1,14 +1,11 @@
-//! Which vertex lies behind a face: the choice of the next gate and the coding of its apex.
+//! Which vertex lies behind a face: the coding of a gate's apex.
 //!
-//! In: the front around a focus vertex. Out: a gate, and what lies behind it. Forbidden here: positions of new
-//! vertices, colours, labels.
+//! In: the front around a gate. Out: what lies behind it. Forbidden here: positions of new vertices, colours, labels.
 //!
 //! As in the cut-border machine (Gumhold et al. 1999), tets are attached to open faces one by one, and a symbol says
 //! whether the new corner closes the gap to a neighbouring open face, is a new vertex, or lies elsewhere on the front.
-//! Unlike there, the mesh's geometry is known to both sides before its connectivity: the gap at an edge between two
-//! open faces is either sharp, then almost surely closed by one tet, or wide. So the sharpest gap at the focus comes
-//! first, and its angle is the context. Meshes are long in time where nothing moves, so angles and distances are
-//! measured in the extents of the edges around.
+//! Unlike there, the mesh's geometry is known to both sides before its connectivity ([`super::gate`]): the angles of the
+//! gaps around the gate and the distances of the vertices across them are the contexts.
 
 use super::MeshFault;
 use super::bits::Part;
@@ -102,7 +99,7 @@ pub(super) fn code_apex(
     code_elsewhere(coder, (models, rings), (front, vertices), gate, truth)
 }
 
-/// Which candidates have been asked for.
+/// Which vertices across edges of the gate have been asked for.
 struct Asked {
     /// Classes of the first one's angle and distance.
     first: (usize, usize),

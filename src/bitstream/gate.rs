@@ -1,10 +1,10 @@
-//! The choice of the next gate: the open face to be closed, and the vertices that may close it.
+//! The choice of the next gate: the open face to be closed.
 //!
-//! In: the front around a focus vertex. Out: a gate with its candidates. Forbidden here: coding.
+//! In: the front around a focus vertex. Out: a gate, what lies across its edges, and measures there. Forbidden here: coding.
 //!
-//! The mesh's geometry is known to both sides before its connectivity: the gap at an edge between two open faces is
-//! either sharp, then almost surely closed by one tet, or wide. So the sharpest gap at the focus comes first. Meshes are
-//! long in time where nothing moves, so angles and distances are measured in the extents of the edges around.
+//! The gap at an edge between two open faces is either sharp, then almost surely closed by one tet, or wide. So sharp gaps
+//! at the focus come first. Meshes are long in time where nothing moves, so angles and distances are measured in the
+//! extents of the edges around.
 
 use glam::{I64Vec3, IVec3, Vec3};
 

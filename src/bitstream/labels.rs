@@ -11,7 +11,7 @@ use super::symbols::UintModel;
 const PLACES: usize = 6;
 
 /// What is known around a tet behind a gate, each number 0 to 3.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct SameContext {
     /// Corners of the gate known to have several labels.
     pub(super) boundary_corners: usize,

@@ -16,7 +16,7 @@ use super::connectivity::{Apex, ConnectivityModels, code_apex, code_vertex_id};
 use super::extents;
 use super::front::{Corner, Front, Met, NOWHERE, NewTet};
 use super::gate::Gate;
-use super::hops::Hops;
+use super::hops::{Hops, place};
 use super::labels::LabelModels;
 use super::near::Rings;
 use super::neighbours::Neighbours;
@@ -95,8 +95,9 @@ pub(super) struct Slab {
     /// Per wedge the next older one of its vertex.
     wedge_next: Vec<u32>,
     vertices: Vertices,
-    stars: Stars,
     neighbours: Neighbours,
+    /// Only where hops are passed on, as are the next two.
+    stars: Stars,
     /// Vertices of each tet: the mesh has them only by way of its wedges.
     corners: Vec<[VertexId; 4]>,
     /// Per tet the lowest of the hops that its corners have been told.
@@ -306,7 +307,7 @@ impl Slab {
         let [a, b, c] = gate.corners;
         let corners = [a, b, c, apex];
         // A new apex has no open faces.
-        let is_known = (apex.index()) < known;
+        let is_known = apex.index() < known;
         let met = if is_known { self.front.meet(&self.vertices, corners, gate.corner) } else { Met::NOTHING };
         self.attach(side, corners, &met, Some((gate.corner, before.label)))
     }
@@ -373,7 +374,8 @@ impl Slab {
         self.mesh.pinned[vertex.index()] = pinned;
         self.vertices.push(position, self.bounds.sides(position), self.front.push_list());
         let frame = (position.z >> self.bounds.domain.subpixel_bits) as u32;
-        self.hops.push_vertex(frame);
+        let place = place([position.x, position.y], self.bounds.domain.subpixel_bits);
+        self.hops.push_vertex(frame, place);
         if !self.bounds.top_known {
             self.mesh.domain.duration = self.mesh.domain.duration.max(frame + 1);
         }
@@ -410,7 +412,8 @@ impl Slab {
         Ok(())
     }
 
-    /// Appends a tet with its label and wedges, and moves the front over it. `before` is the label before its gate.
+    /// Appends a tet with its label and wedges, and moves the front over it. `gate` is its gate's first corner, with the
+    /// label before it; a seed has none.
     fn attach(
         &mut self,
         side: &mut impl Side,

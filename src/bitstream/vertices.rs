@@ -27,7 +27,7 @@ pub(super) struct Vertex {
     pub(super) extent: IVec3,
     /// Where the list of its open faces ends.
     pub(super) open: Corner,
-    /// Its coded tets.
+    /// Its coded tets, where hops are passed on.
     pub(super) star: Star,
     /// How many of them had been told a hop of this vertex, and which.
     pub(super) told_tets: u32,

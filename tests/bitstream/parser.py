@@ -254,7 +254,7 @@ class Slab:
         self.coder = Coder(RangeDecoder(payload), self.models)
         self.low = None if last else (self.packets + 1) * self.unit
         newly_low = [v for v in range(len(self.positions)) if self.is_low(v) and self.hops[v] > 0]
-        for v in sorted(newly_low, key=lambda v: (self.positions[v][2] // self.unit, v)):
+        for v in sorted(newly_low, key=lambda v: (self.place(v), v)):
             self.lower(v, 0)
         self.uniform = self.coder.bit("uniform")
         while True:
@@ -271,6 +271,10 @@ class Slab:
         self.neighbours = {}
         self.coder.decoder.check_end()
         self.packets += 1
+
+    def place(self, v):
+        x, y = (self.positions[v][axis] // self.unit // 8 for axis in range(2))
+        return sum((x >> bit & 1) << 2 * bit | (y >> bit & 1) << 2 * bit + 1 for bit in range(16))
 
     def is_low(self, v):
         return self.low is None or self.positions[v][2] < self.low

@@ -66,13 +66,13 @@ impl Slab {
     /// What tells whether the tet has the label before its gate.
     #[inline]
     fn label_context(&self, [a, b, c, _]: [VertexId; 4], before: u32, closed: &[Option<u32>; 3]) -> SameContext {
-        let mut context = SameContext::default();
-        let agreeing: usize = closed.iter().map(|&label| usize::from(label == Some(before))).sum();
-        context.agreeing = agreeing;
-        context.differing = closed.iter().map(|label| usize::from(label.is_some())).sum::<usize>() - agreeing;
+        let agreeing = closed.iter().filter(|&&label| label == Some(before)).count();
         let is_boundary = |vertex: VertexId| usize::from(self.vertices[vertex].wedges.count > 1);
-        context.boundary_corners = is_boundary(a) + is_boundary(b) + is_boundary(c);
-        context
+        SameContext {
+            boundary_corners: is_boundary(a) + is_boundary(b) + is_boundary(c),
+            agreeing,
+            differing: closed.iter().flatten().count() - agreeing,
+        }
     }
 
     /// Labels at the corners but for the one before the gate, with the number of corners that have them: the most likely
