@@ -273,7 +273,7 @@ class Slab:
         self.packets += 1
 
     def place(self, v):
-        x, y = (self.positions[v][axis] // self.unit // 8 for axis in range(2))
+        x, y = (min(65535, self.positions[v][axis] // self.unit // 8) for axis in range(2))
         return sum((x >> bit & 1) << 2 * bit | (y >> bit & 1) << 2 * bit + 1 for bit in range(16))
 
     def is_low(self, v):
