@@ -1,4 +1,4 @@
-//! Maps keyed by a face, for the coding and for drawing, which find a tet's neighbours as it comes.
+//! Maps keyed by a face, for drawing and for simplification, which find a tet's neighbours as it comes.
 //!
 //! In: faces, as three vertices in whatever order the caller keeps to. Out: what was stored under them. Forbidden
 //! here: iteration, whose order is no one's business.
