@@ -1,10 +1,9 @@
 //! How long edges are around each vertex, axis by axis: the scale in which the mesh is about as dense everywhere.
 //!
-//! In: tets as they are coded. Out: typical extents, the unit of distances, angles and residuals there. Forbidden here:
+//! In: tets behind gates, as they are coded. Out: typical extents, the unit of distances, angles and residuals there. Forbidden here:
 //! floating point, and any order that depends on more than the order of calls.
 
 use glam::IVec3;
-use wide::i32x4;
 
 use super::vertices::Vertices;
 use crate::mesh::VertexId;
@@ -12,26 +11,23 @@ use crate::mesh::VertexId;
 /// Extents are counted in this part of a lattice unit.
 pub(crate) const PARTS: i32 = 16;
 
-/// Takes a tet into the running means of the extents of the edges at its corners, in 1/16 lattice units; they are 0
-/// before the first.
+/// Takes the edges from a tet's gate to its apex, its last corner, into the running means of the extents of the edges at
+/// its corners, in 1/16 lattice units; they are 0 before the first.
+#[inline]
 pub(super) fn learn(vertices: &mut Vertices, corners: [VertexId; 4], positions: [IVec3; 4]) {
-    let [a, b, c, d] = positions.map(lanes);
-    let [ab, ac, ad] = [(b - a).abs(), (c - a).abs(), (d - a).abs()];
-    let [bc, bd, cd] = [(c - b).abs(), (d - b).abs(), (d - c).abs()];
-    let around = [ab + ac + ad, ab + bc + bd, ac + bc + cd, ad + bd + cd];
-    for (vertex, sum) in corners.into_iter().zip(around) {
-        // A third, exact for what is not negative.
-        let here = (sum * i32x4::splat(PARTS)).mul_keep_high(i32x4::splat(0x5555_5556));
+    let [first, second, third, apex] = positions;
+    let [a, b, c] = [first, second, third].map(|position| PARTS * (apex - position).abs());
+    for (vertex, here) in corners.into_iter().zip([a, b, c]) {
         let mean = &mut vertices[vertex].extent;
-        let known = lanes(*mean);
-        let next = if *mean == IVec3::ZERO { here } else { known + ((here - known) >> 2) };
-        let [x, y, t, _] = next.to_array();
-        *mean = IVec3::new(x, y, t);
+        *mean = if *mean == IVec3::ZERO { here } else { *mean + ((here - *mean) >> 3) };
     }
-}
-
-fn lanes(v: IVec3) -> i32x4 {
-    i32x4::new([v.x, v.y, v.z, 0])
+    let mean = &mut vertices[corners[3]].extent;
+    if *mean == IVec3::ZERO {
+        // A third, exact for what is not negative.
+        let third = |sum: i32| ((i64::from(sum) * 0x5555_5556) >> 32) as i32;
+        let sum = a + b + c;
+        *mean = IVec3::new(third(sum.x), third(sum.y), third(sum.z));
+    }
 }
 
 /// The sum over three vertices, at least that of a lattice unit.
@@ -48,19 +44,24 @@ pub(crate) fn size_of(extents: IVec3) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bitstream::front::Corner;
 
     #[test]
     fn means_follow_the_tets() {
         let mut vertices = Vertices::default();
-        (0..4).for_each(|_| vertices.push(IVec3::ZERO, 0));
+        (0..4).for_each(|_| vertices.push(IVec3::ZERO, 0, Corner::NONE));
         let corners = [0, 1, 2, 3].map(VertexId);
         assert_eq!(around(&vertices, [corners[0]; 3]), IVec3::splat(48));
         assert_eq!(size_of(vertices[corners[0]].extent), 0);
         let at = [[0, 0, 0], [30, 0, 0], [0, 60, 0], [0, 0, 90]].map(IVec3::from_array);
         learn(&mut vertices, corners, at);
-        assert_eq!(vertices[corners[0]].extent, IVec3::new(160, 320, 480));
-        assert_eq!(size_of(vertices[corners[0]].extent), 24);
+        let extents = |vertices: &Vertices| corners.map(|v| vertices[v].extent);
+        let gate = [[0, 0, 1440], [480, 0, 1440], [0, 960, 1440]].map(IVec3::from_array);
+        assert_eq!(extents(&vertices)[..3], gate);
+        assert_eq!(extents(&vertices)[3], IVec3::new(160, 320, 1440));
+        assert_eq!(size_of(vertices[corners[3]].extent), 26);
         learn(&mut vertices, corners, at.map(|p| p * 2));
-        assert_eq!(vertices[corners[0]].extent, IVec3::new(200, 400, 600));
+        assert_eq!(extents(&vertices)[1], IVec3::new(540, 0, 1620));
+        assert_eq!(extents(&vertices)[3], IVec3::new(160, 320, 1440));
     }
 }

@@ -13,7 +13,7 @@ use super::header::MAX_HEADER_BYTES;
 use super::{Limits, ParseError, SequenceHeader};
 
 /// Version of the format, the last byte of [`MAGIC`].
-pub const VERSION: u8 = 3;
+pub const VERSION: u8 = 4;
 
 /// First bytes of a keyframe packet, and so of a file. The first byte is no ASCII and the line end would not survive a
 /// transfer as text, as in PNG.

@@ -1,187 +1,318 @@
 //! The front: faces of coded tets behind which nothing is coded yet (the "cut-border" of Gumhold et al. 1999).
 //!
-//! In: faces, as tets are coded. Out: the open faces at a vertex, the one that a new face closes. Forbidden here:
-//! coding, and any order that depends on more than the order of calls.
+//! In: tets, as they are coded. Out: the open faces at a vertex, the one across each edge of a face, and how sharp the gap
+//! between the two is. Forbidden here: coding, and any order that depends on more than the order of calls.
+//!
+//! As in a half-edge structure, every edge of an open face knows its partner, the edge of the face on the other side of
+//! the gap there; so what lies next to a gate is read, not looked for. A new tet changes partners at its own six edges
+//! only ([`cover`]).
 
-mod lists;
+mod cover;
 
-use glam::{DVec3, I64Vec3, IVec3};
+use glam::Vec3;
 
 use super::vertices::Vertices;
 use crate::mesh::VertexId;
-use lists::Lists;
-pub(super) use lists::{Lanes, List, Met, ROOM, Spoke, equal_lanes};
+pub(super) use cover::{Met, NewTet};
 
-/// A face with a coded tet on one side only. A line of the cache.
-#[derive(Debug, Clone)]
-#[repr(align(64))]
-pub(super) struct OpenFace {
-    /// Unit normal, measured in the extents of edges around it, pointing to the open side.
-    pub(super) normal: DVec3,
-    /// Anticlockwise as seen from the open side: a tet of these and a vertex on the open side is positive.
-    corners: [VertexId; 3],
-    pub(super) behind: CodedTet,
-    /// Where it stands in the list of each corner.
-    blocks: [u32; 3],
+/// A corner of an open face: the number of its row. It also stands for the edge from it to the next corner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Corner(u32);
+
+impl Corner {
+    /// A row that may be written to, and belongs to no face.
+    pub(super) const NONE: Self = Self(0);
+
+    #[inline]
+    fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    #[inline]
+    fn face(self) -> usize {
+        (self.0 >> 2) as usize
+    }
+
+    #[inline]
+    fn place(self) -> usize {
+        (self.0 & 3) as usize
+    }
+
+    #[inline]
+    pub(super) fn is_some(self) -> bool {
+        self != Self::NONE
+    }
+
+    /// The next corner of the face, anticlockwise as seen from the open side.
+    #[inline]
+    pub(super) fn next(self) -> Self {
+        Self(if self.0 & 2 == 0 { self.0 + 1 } else { self.0 - 2 })
+    }
+
+    /// The corner before it.
+    #[inline]
+    pub(super) fn previous(self) -> Self {
+        Self(if self.0 & 3 == 0 { self.0 + 2 } else { self.0 - 1 })
+    }
 }
 
-/// The coded tet behind an open face.
+/// No vertex.
+pub(super) const NOWHERE: VertexId = VertexId(u32::MAX);
+
+/// How sharp a gap is: 0 if it is 180 degrees or wider or there is no partner, else 1 to 254 with the cosine of its angle.
+pub(super) type Sharpness = u8;
+
+/// See [`Sharpness`].
+pub(super) const WIDE: Sharpness = 0;
+
+/// Gaps from here on are as good as sure to be closed by one tet: about 80 degrees.
+const SHARP: Sharpness = 150;
+
+/// A gap that has not been asked for since its edge got its partner.
+const UNKNOWN: Sharpness = 255;
+
+/// Steps of sharpness for the cosines from -1 to 1.
+const STEPS: f32 = 253.0;
+
+/// What is asked of a corner when the front is walked.
+///
+/// A face has four rows, the last one unused. So has what no face has: [`Corner::NONE`], and the ends of the lists of four
+/// vertices at a time, so that lists are circles, and that nothing has to be asked before a row is written to.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct CodedTet {
-    pub(super) number: u32,
+#[repr(align(16))]
+struct Row {
+    vertex: VertexId,
+    /// The partner of the edge, which runs the other way.
+    across: Corner,
+    /// Neighbours in the list of the vertex.
+    older: Corner,
+    younger: Corner,
+}
+
+impl Row {
+    const NONE: Self = Self { vertex: NOWHERE, across: Corner::NONE, older: Corner::NONE, younger: Corner::NONE };
+}
+
+/// What else there is to an open face: half a line of the cache.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(32))]
+struct Back {
+    /// Unit normal, measured in the extents of edges around it, pointing to the open side.
+    normal: Vec3,
+    /// How sharp the gap at each edge is.
+    gaps: [Sharpness; 4],
+    before: Before,
+}
+
+/// The coded tet before an open face.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Before {
+    /// The tet's number.
+    pub(super) tet: u32,
     pub(super) label: u32,
     /// Its corner that is not one of the face.
     pub(super) opposite: VertexId,
 }
 
-/// What the plane of (a, b, c) is perpendicular to, in lattice units, exact; the same for each corner that comes first.
-#[inline]
-pub(super) fn plane([a, b, c]: [IVec3; 3]) -> I64Vec3 {
-    (b - a).as_i64vec3().cross((c - a).as_i64vec3())
-}
-
-/// Unit normal of a plane, not 0, where each axis is measured in units of `scale`. Every operation is one of IEEE 754's
-/// correctly rounded ones, so all machines agree on it; a plane's components are less than 2^53.
-#[inline]
-pub(super) fn unit_normal(plane: I64Vec3, scale: DVec3) -> DVec3 {
-    let n = plane.as_dvec3() * scale;
-    n / (n.x * n.x + n.y * n.y + n.z * n.z).sqrt()
+impl Back {
+    const NONE: Self =
+        Self { normal: Vec3::ZERO, gaps: [WIDE; 4], before: Before { tet: 0, label: 0, opposite: NOWHERE } };
 }
 
 /// The open faces, listed at each of their vertices, the youngest first.
 #[derive(Debug, Clone)]
 pub(super) struct Front {
-    faces: Vec<OpenFace>,
+    /// Four a face.
+    rows: Vec<Row>,
+    /// One a face.
+    backs: Vec<Back>,
+    /// Faces that are not in use.
     free: Vec<u32>,
-    lists: Lists,
+    /// Where the list of the next vertex ends, unless it is a multiple of four.
+    next_end: u32,
 }
 
 impl Front {
     pub(super) fn new() -> Self {
-        Self { faces: Vec::new(), free: Vec::new(), lists: Lists::new() }
+        let mut front = Self { rows: Vec::new(), backs: Vec::new(), free: Vec::new(), next_end: 0 };
+        front.grow();
+        front
     }
 
+    /// Adds the rows of a face. Returns the first.
     #[inline]
-    pub(super) fn face(&self, face: u32) -> &OpenFace {
-        &self.faces[face as usize]
+    fn grow(&mut self) -> Corner {
+        let first = Corner(self.rows.len() as u32);
+        self.rows.extend([Row::NONE; 4]);
+        self.backs.push(Back::NONE);
+        first
     }
 
-    /// Open faces at `vertex`, the youngest first.
-    #[inline]
-    pub(super) fn at(&self, vertices: &Vertices, vertex: VertexId) -> impl Iterator<Item = Spoke> + use<'_> {
-        self.lists.at(vertices[vertex].list)
-    }
-
-    /// Reads what will be asked of these vertices, all of them before the first answer is needed: so the waits for memory
-    /// overlap.
-    #[inline]
-    pub(super) fn fetch(&self, vertices: &Vertices, around: impl Iterator<Item = VertexId>) {
-        let sum = around.fold(0, |sum, vertex| sum ^ self.lists.youngest_face(vertices[vertex].list));
-        std::hint::black_box(sum);
-    }
-
-    /// The youngest of the `scan` youngest open faces at `from` that leads around its edge to `to`, in the way that the
-    /// edge is gone through from `to` to `from` (`back`) or the other way; with its third corner.
-    pub(super) fn across(
-        &self,
-        vertices: &Vertices,
-        [from, to]: [VertexId; 2],
-        scan: u32,
-        back: bool,
-    ) -> Option<(u32, VertexId)> {
-        let spoke = self.lists.find_across(vertices[from].list, scan, back, to)?;
-        Some((spoke.face, if back { spoke.second } else { spoke.third }))
-    }
-
-    /// What of a new tet's face with these corners (seen from outside the new tet) is open. It is looked for where there
-    /// are fewest.
-    pub(super) fn meet(&self, vertices: &Vertices, [a, b, c]: [VertexId; 3]) -> Met {
-        let [at_a, at_b, at_c] = [vertices[a].list, vertices[b].list, vertices[c].list];
-        let (mut list, mut corners) = (at_a, [a, b, c]);
-        if at_b.count() < list.count() {
-            (list, corners) = (at_b, [b, c, a]);
+    /// An empty list for a new vertex: its end.
+    pub(super) fn push_list(&mut self) -> Corner {
+        if self.next_end & 3 == 0 {
+            self.next_end = self.grow().0;
         }
-        if at_c.count() < list.count() {
-            (list, corners) = (at_c, [c, a, b]);
-        }
-        self.lists.meet(list, corners)
+        let end = Corner(self.next_end);
+        self.next_end += 1;
+        let row = &mut self.rows[end.index()];
+        (row.older, row.younger) = (end, end);
+        end
     }
 
-    /// Adds an open face of a tet with this unit normal. Returns its id.
-    pub(super) fn insert(
-        &mut self,
-        vertices: &mut Vertices,
-        corners: [VertexId; 3],
-        normal: DVec3,
-        behind: CodedTet,
-    ) -> u32 {
-        let [a, b, c] = corners;
-        let face = self.free.last().copied().unwrap_or(self.faces.len() as u32);
-        let mut list = |vertex: VertexId, second: VertexId, third: VertexId| {
-            self.lists.push(vertex, &mut vertices[vertex].list, Spoke { face, second, third })
+    /// The tet before the face of this corner.
+    #[inline]
+    pub(super) fn before(&self, corner: Corner) -> &Before {
+        &self.backs[corner.face()].before
+    }
+
+    /// All rows of a face.
+    #[inline(always)]
+    fn rows_of(&self, corner: Corner) -> &[Row; 4] {
+        &self.rows.as_chunks().0[corner.face()]
+    }
+
+    #[inline]
+    fn vertex(&self, corner: Corner) -> VertexId {
+        self.rows[corner.index()].vertex
+    }
+
+    /// The vertices of a face, this corner's first.
+    #[inline]
+    pub(super) fn vertices_from(&self, corner: Corner) -> [VertexId; 3] {
+        let rows = self.rows_of(corner);
+        [corner, corner.next(), corner.previous()].map(|corner| rows[corner.place()].vertex)
+    }
+
+    /// The partner of an edge.
+    #[inline]
+    fn across(&self, edge: Corner) -> Corner {
+        self.rows[edge.index()].across
+    }
+
+    /// The partners of a face's edges, this one's first.
+    #[inline]
+    fn across_from(&self, edge: Corner) -> [Corner; 3] {
+        let rows = self.rows_of(edge);
+        [edge, edge.next(), edge.previous()].map(|edge| rows[edge.place()].across)
+    }
+
+    /// The vertex across an edge, [`NOWHERE`] without a partner: the corner of its face that is not on the edge.
+    #[inline]
+    pub(super) fn vertex_across(&self, edge: Corner) -> VertexId {
+        self.vertex(self.across(edge).previous())
+    }
+
+    /// Corners of open faces at `vertex`, the youngest first.
+    #[inline]
+    pub(super) fn at(&self, vertices: &Vertices, vertex: VertexId) -> impl Iterator<Item = Corner> + use<'_> {
+        let end = vertices[vertex].open;
+        let mut corner = end;
+        std::iter::from_fn(move || {
+            corner = self.rows[corner.index()].older;
+            (corner != end).then_some(corner)
+        })
+    }
+
+    /// The corner at `vertex` of the youngest face before a gap of [`SHARP`] there, going around it anticlockwise; if the
+    /// `scan` youngest have none, of the one before the sharpest: the youngest of equals, and without a gap below 180
+    /// degrees the youngest.
+    #[inline]
+    pub(super) fn find_sharpest(&mut self, vertices: &Vertices, vertex: VertexId, scan: usize) -> Option<Corner> {
+        let end = vertices[vertex].open;
+        let mut corner = self.rows[end.index()].older;
+        if corner == end {
+            return None;
+        }
+        let (mut found, mut sharpest) = (corner, WIDE);
+        for _ in 0..scan {
+            let older = self.rows[corner.index()].older;
+            let gap = self.gap(vertices, corner.previous());
+            found = if gap > sharpest { corner } else { found };
+            sharpest = sharpest.max(gap);
+            if older == end || sharpest >= SHARP {
+                break;
+            }
+            corner = older;
+        }
+        Some(found)
+    }
+
+    /// How sharp the gap between an edge's face and its partner's is.
+    #[inline]
+    pub(super) fn gap(&mut self, vertices: &Vertices, edge: Corner) -> Sharpness {
+        let known = self.backs[edge.face()].gaps[edge.place()];
+        if known == UNKNOWN { self.measure(vertices, edge) } else { known }
+    }
+
+    #[inline(never)]
+    fn measure(&mut self, vertices: &Vertices, edge: Corner) -> Sharpness {
+        let Row { vertex, across: partner, .. } = self.rows[edge.index()];
+        let along = (vertices.position(self.vertex(partner)) - vertices.position(vertex)).as_vec3();
+        let (n, m) = (self.backs[edge.face()].normal, self.backs[partner.face()].normal);
+        let fold = n.cross(m);
+        let gap = if fold.x * along.x + fold.y * along.y + fold.z * along.z < 0.0 {
+            let cos = -(n.x * m.x + n.y * m.y + n.z * m.z);
+            ((cos + 1.0) * (STEPS / 2.0)).clamp(0.0, STEPS) as Sharpness + 1
+        } else {
+            WIDE
         };
-        let blocks = [list(a, b, c), list(b, c, a), list(c, a, b)];
-        let open = OpenFace { corners, behind, normal, blocks };
-        match self.free.pop() {
-            Some(face) => self.faces[face as usize] = open,
-            None => self.faces.push(open),
-        }
-        face
+        // The partner sees the same products, of two that change their signs.
+        self.backs[edge.face()].gaps[edge.place()] = gap;
+        self.backs[partner.face()].gaps[partner.place()] = gap;
+        gap
     }
 
-    /// Takes an open face out.
-    pub(super) fn remove(&mut self, vertices: &mut Vertices, face: u32) {
-        let OpenFace { corners, blocks, .. } = self.faces[face as usize];
-        for (vertex, block) in corners.into_iter().zip(blocks) {
-            self.lists.remove(vertex, &mut vertices[vertex].list, block, face);
-        }
-        self.free.push(face);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const BEHIND: CodedTet = CodedTet { number: 0, label: 0, opposite: VertexId(0) };
-
-    fn front_of_four() -> (Front, Vertices) {
-        let (mut front, mut vertices) = (Front::new(), Vertices::default());
-        (0..4).for_each(|_| vertices.push(IVec3::ZERO, 0));
-        for corners in crate::mesh::FACES {
-            let corners = corners.map(|c| VertexId(c as u32));
-            front.insert(&mut vertices, corners, DVec3::X, BEHIND);
-        }
-        (front, vertices)
+    /// Makes two edges partners; either may be [`Corner::NONE`].
+    #[inline(always)]
+    fn pair(&mut self, one: Corner, other: Corner) {
+        let gap = if one.is_some() & other.is_some() { UNKNOWN } else { WIDE };
+        self.rows[one.index()].across = other;
+        self.rows[other.index()].across = one;
+        self.backs[one.face()].gaps[one.place()] = gap;
+        self.backs[other.face()].gaps[other.place()] = gap;
     }
 
-    #[test]
-    fn lists_follow_insertions_and_removals() {
-        let (mut front, mut vertices) = front_of_four();
-        for v in (0..4).map(VertexId) {
-            assert_eq!(front.at(&vertices, v).count(), 3);
-            assert!(front.at(&vertices, v).all(|spoke| front.face(spoke.face).corners.contains(&v)));
-        }
-        let outside = [3, 2, 1].map(VertexId);
-        let closed = front.meet(&vertices, outside).mirrored.expect("its mirror image is open");
-        front.remove(&mut vertices, closed);
-        assert_eq!(front.meet(&vertices, outside), Met::NOTHING);
-        let left: Vec<usize> = (0..4).map(|v| front.at(&vertices, VertexId(v)).count()).collect();
-        assert_eq!(left, [3, 2, 2, 2]);
+    /// Adds an open face: its vertices, each with the end of its list, and its normal. Its edges have no partners yet.
+    /// Returns its first corner.
+    #[inline(always)]
+    fn insert(&mut self, corners: [(VertexId, Corner); 3], normal: Vec3, before: Before) -> Corner {
+        let first = match self.free.pop() {
+            Some(face) => Corner(face << 2),
+            None => self.grow(),
+        };
+        self.backs[first.face()] = Back { normal, gaps: [WIDE; 4], before };
+        let [a, b, c] = corners;
+        let rows =
+            [self.list(first, a), self.list(Corner(first.0 + 1), b), self.list(Corner(first.0 + 2), c), Row::NONE];
+        self.rows.as_chunks_mut().0[first.face()] = rows;
+        first
     }
 
-    #[test]
-    fn a_face_is_met_from_any_corner() {
-        let (front, vertices) = front_of_four();
-        for corners in [[1, 2, 3], [2, 3, 1], [3, 1, 2]] {
-            assert!(front.meet(&vertices, corners.map(VertexId)).is_there);
-        }
-        assert!(!front.meet(&vertices, [2, 1, 3].map(VertexId)).is_there);
+    /// Puts a corner at the front of the list of a vertex. Returns its row.
+    #[inline(always)]
+    fn list(&mut self, corner: Corner, (vertex, end): (VertexId, Corner)) -> Row {
+        let older = std::mem::replace(&mut self.rows[end.index()].older, corner);
+        self.rows[older.index()].younger = corner;
+        Row { vertex, across: Corner::NONE, older, younger: end }
     }
 
-    #[test]
-    fn normals_point_to_the_open_side() {
-        let n = unit_normal(plane([IVec3::ZERO, IVec3::X, IVec3::Z]), DVec3::new(2.0, 3.0, 5.0));
-        assert_eq!(n, DVec3::new(0.0, -1.0, 0.0));
+    /// Takes the open face of this corner out of the lists. What becomes of its edges' partners is the caller's matter.
+    #[inline(always)]
+    fn remove(&mut self, corner: Corner) {
+        let [a, b, c, _] = *self.rows_of(corner);
+        for Row { older, younger, .. } in [a, b, c] {
+            self.rows[younger.index()].older = older;
+            self.rows[older.index()].younger = younger;
+        }
+        self.free.push(corner.face() as u32);
+    }
+
+    /// Takes out an open face behind which nothing lies. Its neighbours have no partners there from now on.
+    pub(super) fn give_up(&mut self, corner: Corner) {
+        for partner in self.across_from(corner) {
+            self.pair(partner, Corner::NONE);
+        }
+        self.remove(corner);
     }
 }

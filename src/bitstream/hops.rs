@@ -19,6 +19,22 @@ pub(crate) fn rings(subdivision_levels: u8) -> u8 {
     if subdivision_levels == 0 { 0 } else { MAX_RINGS }
 }
 
+/// Pixels along a side of the cells of [`place`], as a power of two.
+const CELL_BITS: u8 = 3;
+
+/// Where a point of the picture is along a curve of Z-order through cells of some pixels: numbers of points near each other
+/// mostly are, too.
+pub(super) fn place([x, y]: [i32; 2], subpixel_bits: u8) -> u32 {
+    let cell = |coordinate: i32| (coordinate.unsigned_abs() >> (subpixel_bits + CELL_BITS)).min(u16::MAX.into());
+    let spread = |mut bits: u32| {
+        for (shift, mask) in [(8, 0x00ff_00ff), (4, 0x0f0f_0f0f), (2, 0x3333_3333), (1, 0x5555_5555)] {
+            bits = (bits | bits << shift) & mask;
+        }
+        bits
+    };
+    spread(cell(x)) | spread(cell(y)) << 1
+}
+
 /// A vertex not known to be within the rings.
 const FAR: u8 = u8::MAX;
 
@@ -30,8 +46,8 @@ pub(super) struct Hops {
     rings: u8,
     /// Vertices to visit, by hop.
     queues: [VecDeque<VertexId>; MAX_RINGS as usize + 1],
-    /// Vertices that will be low in later packets, by frame.
-    later: BTreeMap<u32, Vec<VertexId>>,
+    /// Vertices that will be low in later packets, with their places, by frame.
+    later: BTreeMap<u32, Vec<(u32, VertexId)>>,
     /// Frames below which a vertex is low.
     low_frames: u32,
 }
@@ -42,23 +58,26 @@ impl Hops {
         Self { hop: Vec::new(), rings, queues: Default::default(), later: BTreeMap::new(), low_frames: 0 }
     }
 
-    /// From here on vertices before frame `low_frames` are low.
+    /// From here on vertices before frame `low_frames` are low. Those that were not come out by their places, in whatever
+    /// packets they were coded, so that what lies next to each other is in the caches together.
     pub(super) fn begin_packet(&mut self, low_frames: u32) {
         self.low_frames = low_frames;
         let still_later = self.later.split_off(&low_frames);
-        for vertex in std::mem::replace(&mut self.later, still_later).into_values().flatten() {
+        let mut risen: Vec<_> = std::mem::replace(&mut self.later, still_later).into_values().flatten().collect();
+        risen.sort_unstable();
+        for (_, vertex) in risen {
             self.lower(vertex, 0);
         }
     }
 
-    /// Adds the next vertex, which lies in the frame `frame`: at its time or before the next frame's.
-    pub(super) fn push_vertex(&mut self, frame: u32) {
+    /// Adds the next vertex, which lies in the frame `frame`: at its time or before the next frame's; and at this [`place`].
+    pub(super) fn push_vertex(&mut self, frame: u32, place: u32) {
         let vertex = VertexId(self.hop.len() as u32);
         self.hop.push(FAR);
         if frame < self.low_frames {
             self.lower(vertex, 0);
         } else {
-            self.later.entry(frame).or_default().push(vertex);
+            self.later.entry(frame).or_default().push((place, vertex));
         }
     }
 
@@ -109,8 +128,8 @@ mod tests {
     fn vertices_come_in_the_order_of_hops() {
         let mut hops = Hops::new(2);
         hops.begin_packet(1);
-        for frame in [3, 0, 1, 0] {
-            hops.push_vertex(frame);
+        for (place, frame) in [3, 0, 1, 0].into_iter().enumerate() {
+            hops.push_vertex(frame, 9 - place as u32);
         }
         assert_eq!(hops.next(), Some((VertexId(1), 0)));
         hops.lower(VertexId(2), 1);
@@ -126,10 +145,18 @@ mod tests {
     }
 
     #[test]
+    fn places_follow_the_curve() {
+        // In pixels, at 3 sub-pixel bits.
+        let at = |x: i32, y: i32| place([8 * x, 8 * y], 3);
+        assert_eq!([at(0, 7), at(8, 0), at(0, 8), at(15, 15), at(16, 0), at(0, 16)], [0, 1, 2, 3, 4, 8]);
+        assert_eq!(place([1 << 19; 2], 0), u32::MAX);
+    }
+
+    #[test]
     fn a_vertex_lowered_while_it_waits_is_visited_once() {
         let mut hops = Hops::new(2);
         hops.begin_packet(1);
-        hops.push_vertex(5);
+        hops.push_vertex(5, 0);
         hops.lower(VertexId(0), 2);
         hops.lower(VertexId(0), 1);
         assert_eq!(hops.next(), Some((VertexId(0), 1)));

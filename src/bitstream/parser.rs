@@ -295,6 +295,10 @@ impl Side for Parsing<'_> {
 
     fn vertex_coded(&mut self, _: VertexId) {}
 
+    fn is_uniform(&self) -> bool {
+        false
+    }
+
     fn label(&mut self, _: u32) -> u32 {
         0
     }

@@ -7,10 +7,11 @@ use glam::IVec3;
 use super::MeshFault;
 use super::bits::Part;
 use super::extents::PARTS;
-use super::front::{plane, unit_normal};
+use super::gate::{plane, unit_normal};
 use super::header::MAX_EXTENT;
 use super::range_coder::{BitCoder, BitModel};
 use super::symbols::{IntModel, UintModel};
+use super::vertices::TOP;
 use crate::mesh::Domain;
 
 /// Classes of a length: the binary logarithm of its square, which is below 2^38.
@@ -21,7 +22,7 @@ const NEARNESS: usize = 3;
 const HEIGHTS: usize = 5;
 
 /// How far ahead of the gate's centre a vertex is expected, in extents along the normal.
-const AHEAD: f64 = 0.625;
+const AHEAD: f32 = 0.625;
 /// Weights, in sixteenths, of the vertices across the gate's edges, relative to the gate's centre.
 const ACROSS: [i32; 3] = [4, 2, 1];
 /// The same of the gate's first and second corner and of the fourth corner of the tet before it.
@@ -96,11 +97,13 @@ impl Bounds {
         if self.top_known { extent } else { IVec3::new(extent.x, extent.y, MAX_EXTENT) }
     }
 
-    /// The sides that a vertex lies on, as bits, but for the end of the slab, which is not known from the start.
+    /// The sides that a vertex lies on, as bits; the end of the slab is one once it is known.
     pub(super) fn sides(&self, position: IVec3) -> u8 {
         let far = self.domain.extent();
-        let on = [position.x == 0, position.x == far.x, position.y == 0, position.y == far.y, position.z == 0];
-        on.into_iter().enumerate().map(|(side, on)| u8::from(on) << side).sum()
+        let on: [bool; 5] =
+            [position.x == 0, position.x == far.x, position.y == 0, position.y == far.y, position.z == 0];
+        let sides: u8 = on.into_iter().enumerate().map(|(side, on)| u8::from(on) << side).sum();
+        if self.top_known && position.z == far.z { sides | TOP } else { sides }
     }
 
     /// The high side along an axis; the end of the slab is one only once it is known.
@@ -112,9 +115,9 @@ impl Bounds {
 /// Where a vertex is expected behind a gate, and the gate's plane.
 struct Expectation {
     /// Mean extent of edges around the gate, in lattice units.
-    extent: [f64; 3],
+    extent: [f32; 3],
     /// The gate's unit normal, measured in extents.
-    normal: [f64; 3],
+    normal: [f32; 3],
     predicted: [i32; 3],
     /// The gate's normal in lattice units, exact.
     plane: [i64; 3],
@@ -128,8 +131,8 @@ impl Expectation {
     fn new(behind: &Behind) -> Self {
         let [a, b, c] = behind.gate;
         let plane = plane(behind.gate);
-        let extent = behind.extent.as_dvec3() / f64::from(3 * PARTS);
-        let normal = unit_normal(plane, extent);
+        let extent = behind.extent.as_vec3() / (3 * PARTS) as f32;
+        let normal = unit_normal(plane, behind.extent);
         let sum = a + b + c;
         let mut ahead = 3 * (SECOND * b + FIRST * a + OPPOSITE * behind.opposite) - (SECOND + FIRST + OPPOSITE) * sum;
         for (weight, across) in ACROSS.into_iter().zip(behind.across) {
@@ -137,7 +140,7 @@ impl Expectation {
         }
         let (extent, normal) = (extent.to_array(), normal.to_array());
         let predicted = [0, 1, 2].map(|axis| {
-            let center = f64::from(sum[axis]) / 3.0 + f64::from(ahead[axis]) / 48.0;
+            let center = sum[axis] as f32 / 3.0 + ahead[axis] as f32 / 48.0;
             (center + AHEAD * extent[axis] * normal[axis] + 0.5).floor() as i32
         });
         // The first of equals.
@@ -170,8 +173,13 @@ impl Expectation {
 }
 
 /// Class of a length in lattice units.
-fn scale_class(length: f64) -> usize {
+fn scale_class(length: f32) -> usize {
     (((length * length).max(1.0) as u64).ilog2() as usize).min(SCALES - 1)
+}
+
+/// Binary digits at the end of a number of this scale that are as good as random: all below half of the length.
+fn low_digits(class: usize) -> u32 {
+    (class as u32 / 2).saturating_sub(1)
 }
 
 /// Predicts and codes the position of the new vertex behind a gate.
@@ -204,9 +212,13 @@ pub(super) fn code_position(
             let nearest = expectation.nearest(position);
             code_height(coder, models, &expectation, nearest, truth[axis])
         } else {
-            let model = &mut models.free[scale_class(expectation.extent[axis])];
+            let class = scale_class(expectation.extent[axis]);
             let predicted = expectation.predicted[axis];
-            i64::from(predicted) + i64::from(model.code(coder, truth[axis].wrapping_sub(predicted)))
+            let rest = truth[axis].wrapping_sub(predicted);
+            let digits = low_digits(class);
+            let high = models.free[class].code(coder, rest >> digits);
+            let low = coder.raw(digits, rest as u32 & ((1 << digits) - 1));
+            i64::from(predicted) + (i64::from(high) << digits) + i64::from(low)
         };
         if !(0..=i64::from(far[axis])).contains(&coordinate) {
             return Err(MeshFault::Range { field: "coordinate", low: 0, high: far[axis].into(), found: coordinate });
@@ -229,7 +241,7 @@ fn code_side(
     for (side, place) in [Some(0), high].into_iter().enumerate() {
         let Some(place) = place else { continue };
         let beyond = if side == 0 { i64::from(predicted) } else { i64::from(place) - i64::from(predicted) };
-        let is_far = beyond as f64 > expectation.extent[axis];
+        let is_far = beyond as f32 > expectation.extent[axis];
         let nearness = if beyond <= 0 { 0 } else { 1 + usize::from(is_far) };
         let corners = behind.gate.iter().filter(|p| p[axis] == place).count();
         if coder.bit(&mut models.on_side[side][corners][nearness], truth == place) {
@@ -250,10 +262,13 @@ fn code_height(
     let axis = expectation.last;
     let scale = expectation.extent[axis] / expectation.normal[axis].abs();
     let expected = (i64::from(expectation.predicted[axis]) - nearest) * direction;
-    let class = (expected as f64 / scale * 4.0).clamp(0.0, (HEIGHTS - 1) as f64) as usize;
+    let class = (expected as f32 / scale * 4.0).clamp(0.0, (HEIGHTS - 1) as f32) as usize;
     let height = ((i64::from(truth) - nearest) * direction).clamp(0, MAX_EXTENT.into()) as u32;
-    let height = models.height[scale_class(scale)][class].code(coder, height);
-    nearest + direction * i64::from(height)
+    let scale = scale_class(scale);
+    let digits = low_digits(scale);
+    let high = models.height[scale][class].code(coder, height >> digits);
+    let low = coder.raw(digits, height & ((1 << digits) - 1));
+    nearest + direction * ((i64::from(high) << digits) + i64::from(low))
 }
 
 /// Codes a position as plain numbers, for the corners of a seed.

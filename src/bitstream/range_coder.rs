@@ -39,10 +39,10 @@ impl BitModel {
     /// A model that expects nothing.
     pub(super) const NEW: Self = Self(1 << (AVERAGE_BITS - 1 + SEEN_BITS));
 
-    /// P(1) in 1/65536, kept away from 0 and 1.
+    /// P(1) in 1/65536. It never comes to 0 or 1: averages no longer move when a step would be less than their last digit.
     #[inline]
     fn probability(self) -> u32 {
-        (self.0 >> (SEEN_BITS + AVERAGE_BITS - 16)).clamp(32, 65_504)
+        self.0 >> (SEEN_BITS + AVERAGE_BITS - 16)
     }
 
     #[inline]
@@ -152,13 +152,13 @@ impl BitCoder for RangeEncoder {
     }
 
     fn raw(&mut self, count: u32, value: u32) -> u32 {
-        for place in (0..count).rev() {
-            self.range >>= 1;
-            if value >> place & 1 == 0 {
-                self.low += u64::from(self.range);
-            }
-            self.normalize();
+        if count > RAW_BITS {
+            let high = self.raw(count - RAW_BITS, value >> RAW_BITS);
+            return high << RAW_BITS | self.raw(RAW_BITS, value & ((1 << RAW_BITS) - 1));
         }
+        self.range >>= count;
+        self.low += u64::from(self.range) * u64::from(value);
+        self.normalize();
         value
     }
 }
@@ -176,7 +176,10 @@ pub(super) struct RangeDecoder<'a> {
     range: u32,
 }
 
-/// Bits that one decision can take up: a probability of 1/2048 leaves 2^13 of a range of 2^24.
+/// Raw bits that are coded at once.
+const RAW_BITS: u32 = 16;
+
+/// Bits that one decision can take up: a probability of 1/16384 leaves 2^10 of a range of 2^24, raw bits 2^8.
 const SPARE: u32 = 16;
 
 impl<'a> RangeDecoder<'a> {
@@ -261,16 +264,14 @@ impl BitCoder for RangeDecoder<'_> {
     }
 
     fn raw(&mut self, count: u32, _: u32) -> u32 {
-        let mut value = 0;
-        for _ in 0..count {
-            self.range >>= 1;
-            let bit = self.window >> 32 < u64::from(self.range);
-            if !bit {
-                self.window -= u64::from(self.range) << 32;
-            }
-            value = value << 1 | u32::from(bit);
-            self.normalize();
+        if count > RAW_BITS {
+            let high = self.raw(count - RAW_BITS, 0);
+            return high << RAW_BITS | self.raw(RAW_BITS, 0);
         }
+        self.range >>= count;
+        let value = ((self.window >> 32) as u32 / self.range).min((1 << count) - 1);
+        self.window -= u64::from(self.range * value) << 32;
+        self.normalize();
         value
     }
 }
@@ -333,7 +334,7 @@ mod tests {
             let mut model = BitModel::NEW;
             for _ in 0..if cfg!(miri) { 1_000 } else { 100_000 } {
                 model.update(bit);
-                assert!((32..=65_504).contains(&model.probability()));
+                assert!((4..=65_532).contains(&model.probability()));
             }
         }
     }

@@ -12,19 +12,20 @@ use glam::IVec3;
 
 use super::bits::Part;
 use super::colors::{ColorModels, ColorSteps, Grains, KnownColor};
-use super::connectivity::{Apex, ConnectivityModels, Gate, choose_gate, code_apex, code_vertex_id};
-use super::extents::{self, PARTS};
-use super::fan::Fan;
-use super::front::{CodedTet, Front, Met, plane, unit_normal};
-use super::hops::Hops;
+use super::connectivity::{Apex, ConnectivityModels, code_apex, code_vertex_id};
+use super::extents;
+use super::front::{Corner, Front, Met, NOWHERE, NewTet};
+use super::gate::Gate;
+use super::hops::{Hops, place};
 use super::labels::LabelModels;
 use super::near::Rings;
+use super::neighbours::Neighbours;
 use super::positions::{Behind, Bounds, PositionModels, code_free_position, code_position};
 use super::range_coder::{BitCoder, BitModel};
 use super::stars::Stars;
 use super::vertices::Vertices;
 use super::{Limits, MeshFault};
-use crate::mesh::{Domain, FACES, TetMesh, VertexId, volume6};
+use crate::mesh::{Domain, TetMesh, VertexId, volume6};
 
 /// One side of the coding: the writer, who answers with the truth, or the parser, whose answers are ignored. Calls
 /// follow the syntax; each tet begins with `seed` or `behind`.
@@ -39,6 +40,8 @@ pub(super) trait Side: BitCoder {
     fn new_vertex(&self) -> Option<(IVec3, bool)>;
     /// The next new vertex has this id.
     fn vertex_coded(&mut self, id: VertexId);
+    /// Whether all tets that are left have one label.
+    fn is_uniform(&self) -> bool;
     /// Label of the current tet; `count`, the number of labels so far, for a new one.
     fn label(&mut self, count: u32) -> u32;
     /// The current tet has a new wedge at the coded vertex `vertex`.
@@ -61,6 +64,8 @@ struct Models {
     positions: PositionModels,
     labels: LabelModels,
     colors: ColorModels,
+    /// Whether all tets of a payload have the label before their gate.
+    uniform: BitModel,
     /// Whether a seed follows.
     seed: BitModel,
     /// Whether a seed's corner is known.
@@ -80,15 +85,18 @@ pub(super) struct Slab {
     max_duration: u32,
     limits: Limits,
     front: Front,
-    fan: Fan,
     rings: Rings,
     hops: Hops,
     models: Box<Models>,
-    /// Last wedge of each label.
-    last_wedge: Vec<u32>,
+    /// Whether tets of the current packet that lie behind a gate have the label before it.
+    is_uniform: bool,
+    /// Number of labels.
+    labels: u32,
     /// Per wedge the next older one of its vertex.
     wedge_next: Vec<u32>,
     vertices: Vertices,
+    neighbours: Neighbours,
+    /// Only where hops are passed on, as are the next two.
     stars: Stars,
     /// Vertices of each tet: the mesh has them only by way of its wedges.
     corners: Vec<[VertexId; 4]>,
@@ -133,7 +141,6 @@ impl Slab {
             max_duration: params.max_duration,
             limits: params.limits,
             front: Front::new(),
-            fan: Fan::NEW,
             rings: Rings::default(),
             hops: Hops::new(params.rings),
             models: Box::new(Models {
@@ -141,13 +148,16 @@ impl Slab {
                 positions: PositionModels::NEW,
                 labels: LabelModels::NEW,
                 colors: ColorModels::NEW,
+                uniform: BitModel::NEW,
                 seed: BitModel::NEW,
                 seed_known: BitModel::NEW,
             }),
-            last_wedge: Vec::new(),
+            is_uniform: false,
+            labels: 0,
             wedge_next: Vec::new(),
             vertices: Vertices::default(),
             stars: Stars::default(),
+            neighbours: Neighbours::default(),
             corners: Vec::new(),
             told: Vec::new(),
             complete: Complete { duration: 1, ..Complete::default() },
@@ -196,9 +206,12 @@ impl Slab {
     /// A mesh that no slab may have; what was coded before stands.
     pub(super) fn code_packet(&mut self, side: &mut impl Side, low_frames: u32) -> Result<(), MeshFault> {
         self.hops.begin_packet(low_frames);
+        side.enter(Part::Labels);
+        let is_uniform = side.is_uniform();
+        self.is_uniform = side.bit(&mut self.models.uniform, is_uniform);
         loop {
             while let Some((vertex, hop)) = self.hops.next() {
-                while let Some(gate) = self.choose_gate(vertex) {
+                while let Some(gate) = Gate::choose(&mut self.front, &self.vertices, vertex) {
                     self.close_gate(side, &gate)?;
                 }
                 self.pass_hop_on(vertex, hop);
@@ -237,12 +250,9 @@ impl Slab {
         }
         self.bounds.domain.duration = duration;
         self.bounds.top_known = true;
+        self.vertices.mark_top(top);
         self.mesh.domain.duration = duration;
         Ok(())
-    }
-
-    fn choose_gate(&mut self, focus: VertexId) -> Option<Gate> {
-        choose_gate(&mut self.fan, (&self.front, &self.vertices), focus)
     }
 
     /// The neighbours of `vertex`, whose star is complete, are one edge farther. Tets that were there the last time
@@ -276,12 +286,13 @@ impl Slab {
         side.check()?;
         if self.is_walled(gate.corners) {
             // It lies on t = duration, which was not known when it was opened.
-            self.close_face(gate.face);
+            self.front.give_up(gate.corner);
             return Ok(());
         }
-        let before = self.front.face(gate.face).behind;
-        let truth = side.behind(before.number, gate.corners);
-        let around = (&self.front, &self.vertices);
+        let before = *self.front.before(gate.corner);
+        let truth = side.behind(before.tet, gate.corners);
+        let known = self.vertices.len();
+        let around = (&mut self.front, &self.vertices);
         let apex = match code_apex(side, (&mut self.models.connectivity, &mut self.rings), around, gate, truth)? {
             Apex::Known(vertex) => vertex,
             Apex::New => self.code_apex_vertex(side, before.opposite, gate)?,
@@ -289,17 +300,16 @@ impl Slab {
                 if nothing == Apex::Top {
                     self.end_at_face(gate.corners)?;
                 }
-                self.close_face(gate.face);
+                self.front.give_up(gate.corner);
                 return Ok(());
             }
         };
         let [a, b, c] = gate.corners;
-        self.attach(side, [a, b, c, apex], Some(gate.face))
-    }
-
-    fn close_face(&mut self, face: u32) {
-        self.front.remove(&mut self.vertices, face);
-        self.fan.close(face);
+        let corners = [a, b, c, apex];
+        // A new apex has no open faces.
+        let is_known = apex.index() < known;
+        let met = if is_known { self.front.meet(&self.vertices, corners, gate.corner) } else { Met::NOTHING };
+        self.attach(side, corners, &met, Some((gate.corner, before.label)))
     }
 
     /// The slab ends at the t of this face.
@@ -315,13 +325,8 @@ impl Slab {
     }
 
     /// Whether the face lies on a side of the box, as far as its sides are known.
-    fn is_walled(&self, corners: [VertexId; 3]) -> bool {
-        let [a, b, c] = corners.map(|v| &self.vertices[v]);
-        if a.sides & b.sides & c.sides != 0 {
-            return true;
-        }
-        let top = self.bounds.far().z;
-        self.bounds.top_known && [a, b, c].iter().all(|v| v.position.z == top)
+    fn is_walled(&self, [a, b, c]: [VertexId; 3]) -> bool {
+        self.vertices[a].sides & self.vertices[b].sides & self.vertices[c].sides != 0
     }
 
     /// Codes the new vertex behind a gate.
@@ -335,7 +340,7 @@ impl Slab {
         let behind = Behind {
             gate: gate.corners.map(at),
             opposite: at(opposite),
-            across: gate.across.map(|vertex| vertex.map(at)),
+            across: gate.across.map(|vertex| (vertex != NOWHERE).then(|| at(vertex))),
             extent: gate.extent,
         };
         let truth = side.new_vertex();
@@ -367,9 +372,10 @@ impl Slab {
         let pinned = self.models.positions.code_pinned(side, pinned);
         let vertex = self.mesh.push_vertex(position);
         self.mesh.pinned[vertex.index()] = pinned;
-        self.vertices.push(position, self.bounds.sides(position));
+        self.vertices.push(position, self.bounds.sides(position), self.front.push_list());
         let frame = (position.z >> self.bounds.domain.subpixel_bits) as u32;
-        self.hops.push_vertex(frame);
+        let place = place([position.x, position.y], self.bounds.domain.subpixel_bits);
+        self.hops.push_vertex(frame, place);
         if !self.bounds.top_known {
             self.mesh.domain.duration = self.mesh.domain.duration.max(frame + 1);
         }
@@ -401,55 +407,49 @@ impl Slab {
                 self.push_vertex(side, position, pinned)?
             };
         }
-        self.attach(side, corners, None)?;
+        self.attach(side, corners, &Met::NOTHING, None)?;
         corners.into_iter().for_each(|v| self.hops.revisit(v));
         Ok(())
     }
 
-    /// Appends a tet with its label and colours, and moves the front over it. `gate` is the open face it was found by.
-    fn attach(&mut self, side: &mut impl Side, corners: [VertexId; 4], gate: Option<u32>) -> Result<(), MeshFault> {
+    /// Appends a tet with its label and wedges, and moves the front over it. `gate` is its gate's first corner, with the
+    /// label before it; a seed has none.
+    fn attach(
+        &mut self,
+        side: &mut impl Side,
+        corners: [VertexId; 4],
+        met: &Met,
+        gate: Option<(Corner, u32)>,
+    ) -> Result<(), MeshFault> {
         let tet = self.mesh.tets.len() as u32;
         if tet >= self.limits.max_tets {
             return Err(MeshFault::TooMany { field: "tets", limit: self.limits.max_tets });
         }
-        let positions = corners.map(|v| self.vertices.position(v));
-        self.check_positive(volume6(positions[0], positions[1], positions[2], positions[3]))?;
-        let is_new = gate.is_some() && self.vertices[corners[3]].star.count == 0;
-        let met = [0, 1, 2, 3].map(|face| match gate {
-            // The gate is face 3, opposite the apex; a new apex has no other open face.
-            Some(_) if face == 3 => Met { mirrored: gate, is_there: false },
-            Some(_) if is_new => Met::NOTHING,
-            _ => self.front.meet(&self.vertices, FACES[face].map(|c| corners[c])),
-        });
+        let around = corners.map(|v| &self.vertices[v]);
+        let (positions, sides) = (around.map(|v| v.position), around.map(|v| v.sides));
+        let [a, b, c, d] = positions;
+        self.check_positive(volume6(a, b, c, d))?;
         side.enter(Part::Labels);
-        let label = self.code_tet_label(side, corners, gate, met.map(|met| met.mirrored))?;
+        let before = gate.map(|(_, label)| label);
+        let closed = self.closed_labels(met);
+        let label = self.code_tet_label(side, corners, before, &closed)?;
         let wedges = self.code_wedges(side, corners, label)?;
+        self.note_neighbours(wedges, label, &[closed[0], closed[1], closed[2], before]);
         self.mesh.tets.push(wedges);
-        self.corners.push(corners);
-        self.told.push(u8::MAX);
-        for vertex in corners {
-            self.stars.push(&mut self.vertices[vertex].star, tet);
+        if self.hops.goes_on(0) {
+            self.corners.push(corners);
+            self.told.push(u8::MAX);
+            for vertex in corners {
+                self.stars.push(&mut self.vertices[vertex].star, tet);
+            }
         }
         extents::learn(&mut self.vertices, corners, positions);
-        for (lacking, (face, met)) in FACES.into_iter().zip(met).enumerate() {
-            if let Some(closed) = met.mirrored {
-                self.close_face(closed);
-                continue;
-            }
-            let face_corners = face.map(|c| corners[c]);
-            if self.is_walled(face_corners) {
-                continue;
-            }
-            if met.is_there {
-                return Err(MeshFault::DuplicateFace { face: face_corners.map(|v| v.0) });
-            }
-            let scale = extents::around(&self.vertices, face_corners).as_dvec3() / f64::from(3 * PARTS);
-            let plane = plane(face.map(|c| positions[c]));
-            let normal = unit_normal(plane, scale);
-            let behind = CodedTet { number: tet, label, opposite: corners[lacking] };
-            let opened = self.front.insert(&mut self.vertices, face_corners, normal, behind);
-            self.fan.open(face_corners, opened, normal, plane);
-        }
+        let tet = NewTet { number: tet, label, corners, positions, sides };
+        let gate = match gate {
+            Some((gate, _)) => gate,
+            None => self.front.sow(&self.vertices, &tet),
+        };
+        self.front.cover(&self.vertices, &tet, gate, met)?;
         side.tet_coded();
         Ok(())
     }

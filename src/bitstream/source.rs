@@ -12,23 +12,90 @@ use super::connectivity::Apex;
 use super::range_coder::{BitCoder, BitModel, RangeEncoder};
 use super::slab::Side;
 use super::{MeshFault, WriteError};
-use crate::mesh::{FACES, FaceMap, MeshError, TetMesh, VertexId, WedgeId};
+use crate::mesh::{FACES, MeshError, TetMesh, VertexId, WedgeId};
 use crate::video::Label;
 
 /// No tet, or no vertex.
 const NONE: u32 = u32::MAX;
+
+/// Frames from here on are one: no slab is so long.
+const LAST_FRAME: usize = 1 << 19;
+
+/// A face of a tet: the one opposite this corner.
+#[derive(Debug, Clone, Copy)]
+struct FaceOfTet {
+    tet: u32,
+    corner: u8,
+}
+
+/// Faces met once so far.
+#[derive(Debug, Default)]
+struct Unpaired {
+    /// Per vertex the last entry of the faces whose lowest vertex it is.
+    last: Vec<u32>,
+    entries: Vec<UnpairedFace>,
+    /// Entries that are not in use.
+    free: Vec<u32>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct UnpairedFace {
+    /// The other vertices, ascending.
+    others: [VertexId; 2],
+    face: FaceOfTet,
+    /// The entry before in the same list.
+    before: u32,
+}
+
+impl Unpaired {
+    /// The face with the same vertices, if it was met before; it is forgotten then. Else the new one is kept.
+    fn pair(&mut self, mut vertices: [VertexId; 3], face: FaceOfTet) -> Option<FaceOfTet> {
+        vertices.sort_unstable();
+        let [lowest, others @ ..] = vertices;
+        if self.last.len() <= lowest.index() {
+            self.last.resize(lowest.index() + 1, NONE);
+        }
+        let (mut younger, mut at) = (NONE, self.last[lowest.index()]);
+        while let Some(&entry) = self.entries.get(at as usize) {
+            if entry.others == others {
+                match self.entries.get_mut(younger as usize) {
+                    Some(younger) => younger.before = entry.before,
+                    None => self.last[lowest.index()] = entry.before,
+                }
+                self.free.push(at);
+                return Some(entry.face);
+            }
+            (younger, at) = (at, entry.before);
+        }
+        let entry = UnpairedFace { others, face, before: self.last[lowest.index()] };
+        self.last[lowest.index()] = match self.free.pop() {
+            Some(free) => {
+                self.entries[free as usize] = entry;
+                free
+            }
+            None => {
+                self.entries.push(entry);
+                self.entries.len() as u32 - 1
+            }
+        };
+        None
+    }
+}
 
 /// What is known about the source mesh beyond itself, from packet to packet.
 #[derive(Debug)]
 pub(super) struct Source {
     /// Tets across the face opposite each corner.
     neighbours: Vec<[u32; 4]>,
-    /// Faces met once so far, by ascending vertices.
-    unpaired: FaceMap<(u32, u8)>,
+    unpaired: Unpaired,
     /// Per source tet: whether it is coded.
     is_coded: Vec<bool>,
-    /// Source tets that were not coded when last looked at, ascending.
-    pending: Vec<u32>,
+    /// How many are not.
+    left: usize,
+    /// Source tets that were not coded when last looked at, by the frame in which their first vertex lies.
+    pending: Vec<Vec<u32>>,
+    /// t of the source vertices for which that holds.
+    times: Vec<i32>,
     /// Stream id of each source vertex.
     coded_vertex: Vec<u32>,
     /// Source ids of the stream's vertices and tets.
@@ -37,20 +104,25 @@ pub(super) struct Source {
     source_wedge: Vec<WedgeId>,
     /// Stream numbers of labels.
     labels: BTreeMap<Label, u32>,
+    /// Whether all tets have one label.
+    is_uniform: bool,
 }
 
 impl Source {
     pub(super) fn new() -> Self {
         Self {
             neighbours: Vec::new(),
-            unpaired: FaceMap::new(),
+            unpaired: Unpaired::default(),
             is_coded: Vec::new(),
+            left: 0,
             pending: Vec::new(),
+            times: Vec::new(),
             coded_vertex: Vec::new(),
             source_vertex: Vec::new(),
             source_tet: Vec::new(),
             source_wedge: Vec::new(),
             labels: BTreeMap::new(),
+            is_uniform: true,
         }
     }
 
@@ -67,27 +139,46 @@ impl Source {
             return Err(WriteError::Pinned { expected: mesh.positions.len(), found: mesh.pinned.len() });
         }
         self.coded_vertex.resize(mesh.positions.len(), NONE);
+        self.follow_times(mesh);
         for tet in known..mesh.tets.len() {
             check_tet(mesh, tet)?;
+            self.is_uniform &= mesh.tet_label(tet) == mesh.tet_label(0);
             self.neighbours.push([NONE; 4]);
             self.is_coded.push(false);
-            self.pending.push(tet as u32);
+            self.left += 1;
+            self.wait(mesh, tet as u32);
             let vertices = mesh.tet_vertices(tet);
             for (corner, face) in FACES.into_iter().enumerate() {
-                let mut key = face.map(|c| vertices[c]);
-                key.sort_unstable();
-                match self.unpaired.remove(key) {
-                    Some((other, other_corner)) => {
-                        self.neighbours[tet][corner] = other;
-                        self.neighbours[other as usize][other_corner as usize] = tet as u32;
-                    }
-                    None => {
-                        self.unpaired.insert(key, (tet as u32, corner as u8));
-                    }
+                let here = FaceOfTet { tet: tet as u32, corner: corner as u8 };
+                if let Some(other) = self.unpaired.pair(face.map(|c| vertices[c]), here) {
+                    self.neighbours[tet][corner] = other.tet;
+                    self.neighbours[other.tet as usize][usize::from(other.corner)] = tet as u32;
                 }
             }
         }
         Ok(())
+    }
+
+    /// Takes in what has become of the vertices' times. Those that are not coded may have moved.
+    fn follow_times(&mut self, mesh: &TetMesh) {
+        let has_moved = self.times.iter().zip(&mesh.positions).any(|(&t, position)| t != position.z);
+        self.times.clear();
+        self.times.extend(mesh.positions.iter().map(|position| position.z));
+        if has_moved {
+            for tet in std::mem::take(&mut self.pending).into_iter().flatten() {
+                self.wait(mesh, tet);
+            }
+        }
+    }
+
+    /// Notes a tet that is to be coded.
+    fn wait(&mut self, mesh: &TetMesh, tet: u32) {
+        let first = mesh.tet_positions(tet as usize).iter().map(|position| position.z).min().unwrap_or(0);
+        let frame = usize::try_from(first >> mesh.domain.subpixel_bits).unwrap_or(0).min(LAST_FRAME);
+        if self.pending.len() <= frame {
+            self.pending.resize(frame + 1, Vec::new());
+        }
+        self.pending[frame].push(tet);
     }
 
     /// Checks that no vertex has changed since it was coded.
@@ -103,14 +194,9 @@ impl Source {
         Ok(())
     }
 
-    /// Forgets which tets were pending but are coded by now.
-    pub(super) fn sweep(&mut self) {
-        self.pending.retain(|&tet| !self.is_coded[tet as usize]);
-    }
-
     /// Whether every source tet is coded.
     pub(super) fn is_drained(&self) -> bool {
-        self.pending.is_empty()
+        self.left == 0
     }
 }
 
@@ -133,21 +219,19 @@ fn check_tet(mesh: &TetMesh, tet: usize) -> Result<(), MeshError> {
 pub(super) struct Writing<'a> {
     source: &'a mut Source,
     mesh: &'a TetMesh,
-    /// Vertices before this t are low.
-    low_until: i32,
+    /// Vertices before this frame are low.
+    low_frames: u32,
     encoder: RangeEncoder,
     /// The current source tet.
     tet: usize,
     /// The source vertex that is coded next.
     vertex: VertexId,
-    /// Place in `source.pending` from which on seeds are looked for.
-    seeds_from: usize,
 }
 
 impl<'a> Writing<'a> {
-    pub(super) fn new(source: &'a mut Source, mesh: &'a TetMesh, low_until: i32) -> Self {
+    pub(super) fn new(source: &'a mut Source, mesh: &'a TetMesh, low_frames: u32) -> Self {
         let encoder = RangeEncoder::new();
-        Self { source, mesh, low_until, encoder, tet: 0, vertex: VertexId(0), seeds_from: 0 }
+        Self { source, mesh, low_frames, encoder, tet: 0, vertex: VertexId(0) }
     }
 
     /// The payload.
@@ -174,13 +258,15 @@ impl BitCoder for Writing<'_> {
 
 impl Side for Writing<'_> {
     fn seed(&mut self) -> bool {
-        while let Some(&tet) = self.source.pending.get(self.seeds_from) {
-            let is_low = self.mesh.tet_positions(tet as usize).iter().any(|p| p.z < self.low_until);
-            if is_low && !self.source.is_coded[tet as usize] {
-                self.tet = tet as usize;
-                return true;
+        let frames = usize::try_from(self.low_frames).unwrap_or(usize::MAX).min(self.source.pending.len());
+        for pending in &mut self.source.pending[..frames] {
+            while let Some(&tet) = pending.last() {
+                if !self.source.is_coded[tet as usize] {
+                    self.tet = tet as usize;
+                    return true;
+                }
+                pending.pop();
             }
-            self.seeds_from += 1;
         }
         false
     }
@@ -216,6 +302,10 @@ impl Side for Writing<'_> {
         self.source.source_vertex.push(self.vertex);
     }
 
+    fn is_uniform(&self) -> bool {
+        self.source.is_uniform
+    }
+
     fn label(&mut self, count: u32) -> u32 {
         *self.source.labels.entry(self.mesh.tet_label(self.tet)).or_insert(count)
     }
@@ -233,7 +323,7 @@ impl Side for Writing<'_> {
     }
 
     fn tet_coded(&mut self) {
-        self.source.is_coded[self.tet] = true;
+        self.source.left -= usize::from(!std::mem::replace(&mut self.source.is_coded[self.tet], true));
         self.source.source_tet.push(self.tet as u32);
     }
 

@@ -10,9 +10,12 @@ use std::ops::{Index, IndexMut};
 
 use glam::IVec3;
 
-use super::front::List;
+use super::front::Corner;
 use super::stars::Star;
 use crate::mesh::VertexId;
+
+/// The bit of the slab's end among the sides of the box.
+pub(super) const TOP: u8 = 1 << 5;
 
 /// A coded vertex.
 #[derive(Debug, Clone)]
@@ -22,14 +25,14 @@ pub(super) struct Vertex {
     pub(super) position: IVec3,
     /// Running mean of the extents of the edges at it ([`super::extents`]).
     pub(super) extent: IVec3,
-    /// Its open faces.
-    pub(super) list: List,
-    /// Its coded tets.
+    /// Where the list of its open faces ends.
+    pub(super) open: Corner,
+    /// Its coded tets, where hops are passed on.
     pub(super) star: Star,
     /// How many of them had been told a hop of this vertex, and which.
     pub(super) told_tets: u32,
     pub(super) told_hop: u8,
-    /// The sides of the box that it lies on, as bits; the end of the slab is none of them.
+    /// The sides of the box that it lies on, as bits; the end of the slab is one once it is known.
     pub(super) sides: u8,
     pub(super) wedges: Wedges,
 }
@@ -49,17 +52,24 @@ pub(super) struct Wedges {
 pub(super) struct Vertices(Vec<Vertex>);
 
 impl Vertices {
-    pub(super) fn push(&mut self, position: IVec3, sides: u8) {
+    pub(super) fn push(&mut self, position: IVec3, sides: u8, open: Corner) {
         self.0.push(Vertex {
             position,
             extent: IVec3::ZERO,
-            list: List::EMPTY,
+            open,
             star: Star::EMPTY,
             told_tets: 0,
             told_hop: u8::MAX,
             sides,
             wedges: Wedges { youngest: u32::MAX, label: 0, count: 0 },
         });
+    }
+
+    /// The slab ends at `top`.
+    pub(super) fn mark_top(&mut self, top: i32) {
+        for vertex in self.0.iter_mut().filter(|vertex| vertex.position.z == top) {
+            vertex.sides |= TOP;
+        }
     }
 
     pub(super) fn len(&self) -> usize {

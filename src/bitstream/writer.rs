@@ -87,17 +87,16 @@ impl SlabWriter {
             })
         });
         self.source.check_unchanged(mesh, slab.mesh())?;
-        let (low_frames, low_until) = if last {
+        let low_frames = if last {
             slab.end_at(mesh.domain.duration)?;
             body.extend_from_slice(&mesh.domain.duration.to_le_bytes());
-            (u32::MAX, i32::MAX)
+            u32::MAX
         } else {
-            (self.packets + 1, (self.packets as i32 + 1).saturating_mul(mesh.domain.unit()))
+            self.packets + 1
         };
-        let mut side = Writing::new(&mut self.source, mesh, low_until);
+        let mut side = Writing::new(&mut self.source, mesh, low_frames);
         slab.code_packet(&mut side, low_frames)?;
         body.extend_from_slice(&side.finish());
-        self.source.sweep();
         self.frame(&body, last)
     }
 

@@ -1,4 +1,4 @@
-//! Maps keyed by a face, for the coding and for drawing, which find a tet's neighbours as it comes.
+//! Maps keyed by a face, for drawing and for simplification, which find a tet's neighbours as it comes.
 //!
 //! In: faces, as three vertices in whatever order the caller keeps to. Out: what was stored under them. Forbidden
 //! here: iteration, whose order is no one's business.
@@ -24,11 +24,6 @@ impl<T> FaceMap<T> {
         Self(HashMap::with_hasher(FoldState([random.hash_one(0u8), random.hash_one(1u8) | 1])))
     }
 
-    pub(crate) fn get(&self, face: [VertexId; 3]) -> Option<&T> {
-        self.0.get(&key(face))
-    }
-
-    /// Stores `value`, and returns what was there.
     pub(crate) fn insert(&mut self, face: [VertexId; 3], value: T) -> Option<T> {
         self.0.insert(key(face), value)
     }
@@ -89,7 +84,6 @@ mod tests {
         let faces =
             || (0..30u32).flat_map(|a| (0..30).flat_map(move |b| (0..30).map(move |c| [a, b, c].map(VertexId))));
         assert!(faces().enumerate().all(|(n, face)| map.insert(face, n).is_none()));
-        assert!(faces().enumerate().all(|(n, face)| map.get(face) == Some(&n)));
-        assert!(faces().enumerate().all(|(n, face)| map.remove(face) == Some(n) && map.get(face).is_none()));
+        assert!(faces().enumerate().all(|(n, face)| map.remove(face) == Some(n) && map.remove(face).is_none()));
     }
 }

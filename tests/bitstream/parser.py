@@ -14,7 +14,14 @@ from math import floor, sqrt
 
 FAR_EXTENT = 1 << 19
 SCAN = 24
+MEET_SCAN = 128
+SHARP = 150
 FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
+
+
+def f32(value):
+    """A number rounded to IEEE 754 binary32: of one operation on such numbers the same as if it had been made in them."""
+    return struct.unpack("f", struct.pack("f", value))[0]
 
 
 def log2(value):
@@ -53,8 +60,7 @@ class RangeDecoder:
             self.shift()
 
     def bit(self, model):
-        p = max(32, min(65504, model.average >> 6))
-        bound = self.range * p >> 16
+        bound = self.range * (model.average >> 6) >> 16
         bit = self.code < bound
         rate = 131072 // (2 * model.seen + 3)
         if bit:
@@ -69,14 +75,13 @@ class RangeDecoder:
         return int(bit)
 
     def raw(self, count):
-        value = 0
-        for _ in range(count):
-            self.range >>= 1
-            bit = self.code < self.range
-            if not bit:
-                self.code -= self.range
-            value = value << 1 | bit
-            self.normalize()
+        if count > 16:
+            high = self.raw(count - 16)
+            return high << 16 | self.raw(16)
+        self.range >>= count
+        value = min(self.code // self.range, (1 << count) - 1)
+        self.code -= value * self.range
+        self.normalize()
         return value
 
     def check_end(self):
@@ -142,11 +147,19 @@ def volume6(a, b, c, d):
     return dot(cross(sub(b, a), sub(c, a)), sub(d, a))
 
 
-def unit_normal(a, b, c, e):
-    n = cross(tuple(map(float, sub(b, a))), tuple(map(float, sub(c, a))))
-    n = tuple(component * scale for component, scale in zip(n, e))
-    length = sqrt(dot(n, n))
-    return tuple(component / length for component in n)
+def dot32(u, v):
+    return f32(f32(f32(u[0] * v[0]) + f32(u[1] * v[1])) + f32(u[2] * v[2]))
+
+
+def cross32(u, v):
+    return tuple(f32(f32(u[i] * v[j]) - f32(v[i] * u[j])) for i, j in ((1, 2), (2, 0), (0, 1)))
+
+
+def unit_normal(a, b, c, extent):
+    n = cross(sub(b, a), sub(c, a))
+    n = tuple(f32(f32(component) * f32(e)) for component, e in zip(n, extent))
+    length = f32(sqrt(dot32(n, n)))
+    return tuple(f32(component / length) for component in n)
 
 
 class Face:
@@ -154,6 +167,50 @@ class Face:
         self.corners = corners
         self.tet = tet
         self.normal = normal
+        self.across = [None] * 3
+
+    def place(self, vertex):
+        return self.corners.index(vertex)
+
+
+class Edge:
+    """A corner of an open face, and the edge from it to the next."""
+
+    def __init__(self, face, place):
+        self.face, self.at = face, place % 3
+
+    def __eq__(self, other):
+        return other is not None and self.face is other.face and self.at == other.at
+
+    @property
+    def vertex(self):
+        return self.face.corners[self.at]
+
+    @property
+    def next(self):
+        return Edge(self.face, self.at + 1)
+
+    @property
+    def previous(self):
+        return Edge(self.face, self.at + 2)
+
+    @property
+    def partner(self):
+        return self.face.across[self.at]
+
+    @property
+    def corners(self):
+        return self.vertex, self.next.vertex, self.previous.vertex
+
+    @property
+    def vertex_across(self):
+        return self.partner and self.partner.previous.vertex
+
+
+def pair(one, other):
+    for edge, partner in ((one, other), (other, one)):
+        if edge is not None:
+            edge.face.across[edge.at] = partner
 
 
 class Slope:
@@ -183,7 +240,7 @@ class Slab:
         self.labels = 0
         # Per vertex: open faces, tets and wedges, oldest first
         self.open, self.stars, self.wedges_at = [], [], []
-        self.by_corners = {}
+        self.neighbours = {}
         # Hops
         self.hops = []
         self.rings = 2 if header["levels"] else 0
@@ -197,8 +254,9 @@ class Slab:
         self.coder = Coder(RangeDecoder(payload), self.models)
         self.low = None if last else (self.packets + 1) * self.unit
         newly_low = [v for v in range(len(self.positions)) if self.is_low(v) and self.hops[v] > 0]
-        for v in sorted(newly_low, key=lambda v: (self.positions[v][2] // self.unit, v)):
+        for v in sorted(newly_low, key=lambda v: (self.place(v), v)):
             self.lower(v, 0)
+        self.uniform = self.coder.bit("uniform")
         while True:
             while (found := self.next_vertex()) is not None:
                 v, hop = found
@@ -210,8 +268,13 @@ class Slab:
             self.parse_seed()
         for wedge in range(len(self.colors), len(self.wedges)):
             self.parse_color(wedge)
+        self.neighbours = {}
         self.coder.decoder.check_end()
         self.packets += 1
+
+    def place(self, v):
+        x, y = (min(65535, self.positions[v][axis] // self.unit // 8) for axis in range(2))
+        return sum((x >> bit & 1) << 2 * bit | (y >> bit & 1) << 2 * bit + 1 for bit in range(16))
 
     def is_low(self, v):
         return self.low is None or self.positions[v][2] < self.low
@@ -252,7 +315,7 @@ class Slab:
             else:
                 position = tuple(self.coder.decoder.raw(side.bit_length()) for side in self.far())
                 corners.append(self.push_vertex(position))
-        self.attach(tuple(corners), None)
+        self.attach(tuple(corners), None, None)
         for v in corners:
             if self.hops[v] <= self.rings:
                 self.queues[self.hops[v]].append(v)
@@ -285,114 +348,97 @@ class Slab:
 
     def learn_extents(self, corners):
         at = [self.positions[v] for v in corners]
-        for v, own in zip(corners, at):
-            here = tuple(16 * sum(abs(p[axis] - own[axis]) for p in at) // 3 for axis in range(3))
+        edges = [tuple(16 * abs(p - q) for p, q in zip(at[3], own)) for own in at[:3]]
+        for v, here in zip(corners, edges):
             old = self.extents[v]
-            self.extents[v] = here if old == (0, 0, 0) else tuple(o + (h - o) // 4 for o, h in zip(old, here))
+            self.extents[v] = here if old == (0, 0, 0) else tuple(o + (h - o) // 8 for o, h in zip(old, here))
+        if self.extents[corners[3]] == (0, 0, 0):
+            self.extents[corners[3]] = tuple(sum(edge[axis] for edge in edges) // 3 for axis in range(3))
 
     # Section 6: gate and apex
 
-    def fan(self, v):
-        faces = []
-        for face in reversed(self.open[v][-SCAN:]):
-            turn = face.corners.index(v)
-            faces.append((face, face.corners[turn:] + face.corners[:turn]))
-        return faces
+    def corners_at(self, v, scan=SCAN):
+        return [Edge(face, face.place(v)) for face in reversed(self.open[v][-scan:])]
 
     def is_positive(self, gate, apex):
         return volume6(*(self.positions[v] for v in gate), self.positions[apex]) > 0
 
+    def sharpness(self, edge):
+        if edge.partner is None:
+            return 0
+        n, m = edge.face.normal, edge.partner.face.normal
+        along = sub(self.positions[edge.partner.vertex], self.positions[edge.vertex])
+        if not dot32(cross32(n, m), along) < 0.0:
+            return 0
+        cos = -dot32(n, m)
+        return floor(max(0.0, min(253.0, f32(f32(cos + 1.0) * 126.5)))) + 1
+
+    def choose_gate(self, v):
+        corners = self.corners_at(v)
+        best, sharpest = corners[0], 0
+        for corner in corners:
+            sharpness = self.sharpness(corner.previous)
+            if sharpness > sharpest:
+                best, sharpest = corner, sharpness
+            if sharpest >= SHARP:
+                break
+        return best
+
     def close_gate(self, v):
-        fan = self.fan(v)
-
-        def next_of(corners):
-            return next((found for found in fan if found[1][1] == corners[2]), None)
-
-        def cosine(face, other):
-            return -dot(face.normal, other.normal)
-
-        best, best_cos = fan[0], -2.0
-        for face, corners in fan:
-            following = next_of(corners)
-            if following is not None:
-                cos = cosine(face, following[0])
-                if cos > best_cos and self.is_positive(corners, following[1][2]):
-                    best, best_cos = (face, corners), cos
-        gate, corners = best
+        gate = self.choose_gate(v)
+        corners = gate.corners
         if self.is_walled(corners):
-            self.take_out(gate)
+            self.give_up(gate.face)
             return
-        across = [None, None, self.across_third_edge(corners)]
-        if (found := next_of(corners)) is not None:
-            across[0] = (found[1][2], found[0])
-        if (found := next((f for f in fan if f[1][2] == corners[1]), None)) is not None:
-            across[1] = (found[1][1], found[0])
-        candidates = []
-        for vertex, face in filter(None, across):
-            if not self.is_positive(corners, vertex):
-                continue
-            same = next((c for c in candidates if c[0] == vertex), None)
-            if same:
-                same[1] += 1
-                same[2] = max(same[2], cosine(gate, face))
-            else:
-                candidates.append([vertex, 1, cosine(gate, face)])
-        candidates.sort(key=lambda c: (-c[1], -c[2]))
-        apex = self.parse_apex(gate, corners, candidates)
-        if apex == "new":
-            apex = self.push_vertex(self.parse_position(gate, corners, [found and found[0] for found in across]))
+        edges = (gate.previous, gate, gate.next)
+        apex = self.parse_apex(corners, edges)
         if apex is None:
-            self.take_out(gate)
+            self.give_up(gate.face)
+            return
+        met = None
+        if apex == "new":
+            apex = self.push_vertex(self.parse_position(gate.face, corners, [edge.vertex_across for edge in edges]))
         else:
-            self.attach(corners + (apex,), gate)
-
-    def across_third_edge(self, corners):
-        _, second, third = corners
-        from_second = len(self.open[second]) <= len(self.open[third])
-        for face, (_, after, before) in self.fan(second if from_second else third):
-            # The face has the edge the other way: from third to second.
-            if from_second and before == third:
-                return after, face
-            if not from_second and after == second:
-                return before, face
-        return None
+            met = self.meet(gate, corners + (apex,))
+        self.attach(corners + (apex,), gate, met)
 
     def distance2(self, corners, vertex):
         a, b, c = (self.positions[v] for v in corners)
         p = self.positions[vertex]
         extent = self.extent(corners)
-        d = tuple(float(3 * p[i] - (a[i] + b[i] + c[i])) / float(extent[i]) for i in range(3))
-        return 256.0 * dot(d, d)
+        d = tuple(f32(f32(3 * p[i] - (a[i] + b[i] + c[i])) / f32(extent[i])) for i in range(3))
+        return 256.0 * dot32(d, d)
 
-    def parse_apex(self, gate, corners, candidates):
-        first = (0, 0)
-        for place, (vertex, edges, cos) in enumerate(candidates):
-            distance = self.distance2(corners, vertex)
-            classes = (
-                min(floor((cos + 1.0) * 8.0), 15),
-                sum(distance > limit for limit in (0.75, 1.25, 1.75, 2.75, 4.0, 6.0, 9.0)),
-            )
-            if self.coder.bit("join", place, edges - 1, *classes):
-                return vertex
-            if place == 0:
+    def parse_apex(self, corners, edges):
+        across = [edge.vertex_across for edge in edges]
+        first, count = (0, 0), 0
+        for i, edge in enumerate(edges):
+            if across[i] is None or across[i] in across[:i] or not (sharpness := self.sharpness(edge)):
+                continue
+            distance = self.distance2(corners, across[i])
+            classes = (sharpness // 16, sum(distance >= limit for limit in (1, 1.5, 2, 3, 4, 6, 8)))
+            if self.coder.bit("join", count, across[i + 1 :].count(across[i]), *classes):
+                return across[i]
+            if count == 0:
                 first = classes
-        if self.coder.bit("new", len(candidates), *first):
+            count += 1
+        if self.coder.bit("new", count, *first):
             return "new"
-        known = {c[0] for c in candidates}
+        asked = {v for v, edge in zip(across, edges) if v is not None and self.sharpness(edge)}
         near = self.ring(corners)
         far = self.ring(near) - near
         if rank := self.coder.uint("near"):
-            return self.ranked(corners, near - known)[rank - 1]
+            return self.ranked(corners, near - asked)[rank - 1]
         if self.coder.bit("nothing"):
             if self.coder.bit("top"):
                 self.end_at(self.positions[corners[0]][2] // self.unit)
             return None
         if rank := self.coder.uint("far"):
-            return self.ranked(corners, far - known)[rank - 1]
+            return self.ranked(corners, far - asked)[rank - 1]
         return self.coder.decoder.raw(len(self.positions).bit_length())
 
     def ring(self, vertices):
-        return {corner for v in vertices for _, corners in self.fan(v) for corner in corners[1:]}
+        return {vertex for v in vertices for corner in self.corners_at(v) for vertex in corner.corners[1:]}
 
     def ranked(self, corners, vertices):
         positive = [v for v in vertices if self.is_positive(corners, v)]
@@ -404,13 +450,12 @@ class Slab:
 
     # Section 7: tets
 
-    def attach(self, corners, gate):
+    def attach(self, corners, gate, met):
         assert volume6(*(self.positions[v] for v in corners)) > 0, "positive volume"
+        closed, is_there, spokes = met or ([None] * 3, [False] * 3, [None] * 3)
         tet = len(self.tets)
-        facing = [self.by_corners.get(self.key(tuple(reversed([corners[i] for i in face])))) for face in FACES]
-        if gate is not None:
-            facing[3] = gate
-        label = self.parse_label(corners, gate, facing)
+        before = gate and self.tet_labels[gate.face.tet]
+        label = self.parse_label(corners, before, closed)
         wedges = []
         for v in corners:
             wedge = next((w for w in self.wedges_at[v] if self.wedges[w][1] == label), None)
@@ -419,48 +464,120 @@ class Slab:
                 self.wedges.append((v, label))
                 self.wedges_at[v].append(wedge)
             wedges.append(wedge)
+        self.note_neighbours(wedges, label, [c and self.tet_labels[c.face.tet] for c in closed] + [before])
         self.tets.append(corners)
         self.tet_wedges.append(wedges)
         self.tet_labels.append(label)
         for v in corners:
             self.stars[v].append(tet)
         self.learn_extents(corners)
-        for face, closed in zip(FACES, facing):
-            face = tuple(corners[i] for i in face)
-            if closed is not None:
-                self.take_out(closed)
-            elif not self.is_walled(face):
-                scale = tuple(float(e) / 48.0 for e in self.extent(face))
-                added = Face(face, tet, unit_normal(*(self.positions[v] for v in face), scale))
-                assert self.key(face) not in self.by_corners, "one open face with these corners"
-                self.by_corners[self.key(face)] = added
-                for v in face:
-                    self.open[v].append(added)
+        if gate is None:
+            gate = self.sow(corners[:3], tet)
+        self.cover(corners, gate, tet, (closed, is_there, spokes))
 
-    @staticmethod
-    def key(corners):
-        turn = corners.index(min(corners))
-        return corners[turn:] + corners[:turn]
+    def note_neighbours(self, wedges, label, labels):
+        # Faces 0 to 2, and the gate, opposite corner 3.
+        for i in range(4):
+            for j in range(i):
+                if not any(known == label for face, known in enumerate(labels) if face not in (i, j)):
+                    older, younger = sorted((wedges[i], wedges[j]))
+                    if younger >= len(self.colors):
+                        self.neighbours.setdefault(younger, []).append(older)
+
+    # Section 4: the front moves over a tet
+
+    def meet(self, gate, corners):
+        apex = corners[3]
+        closed, is_there, spokes = [None] * 3, [False] * 3, [None] * 3
+        far = []
+        for face, edge in enumerate((gate.next, gate.previous, gate)):
+            if edge.vertex_across == apex:
+                closed[face] = edge.partner.previous
+                far.append(corners[face])
+        if len(far) > 1:
+            return closed, is_there, spokes
+        for corner in self.corners_at(far[0] if far else apex, MEET_SCAN):
+            if apex not in corner.corners:
+                continue
+            corner = Edge(corner.face, corner.face.place(apex))
+            _, after, before = corner.corners
+            for place, vertex in enumerate(corners[:3]):
+                if vertex == after and spokes[place] is None:
+                    spokes[place] = corner
+                if vertex == before and spokes[place] is None:
+                    spokes[place] = corner.previous
+            for face in range(3):
+                start, end = corners[(face + 1) % 3], corners[(face + 2) % 3]
+                if (after, before) == (end, start) and closed[face] is None:
+                    closed[face] = corner
+                is_there[face] |= (after, before) == (start, end)
+        return closed, is_there, spokes
+
+    def sow(self, corners, tet):
+        a, b, c = corners
+        gate = Edge(self.open_face(corners, tet), 0)
+        if not self.is_walled(corners):
+            back = Edge(self.open_face((a, c, b), tet), 0)
+            pair(gate, back.previous)
+            pair(gate.next, back.next)
+            pair(gate.previous, back)
+        return gate
+
+    def open_face(self, corners, tet):
+        normal = unit_normal(*(self.positions[v] for v in corners), self.extent(corners))
+        face = Face(corners, tet, normal)
+        for v in corners:
+            self.open[v].append(face)
+        return face
+
+    def cover(self, corners, gate, tet, met):
+        closed, is_there, spokes = met
+        gate_beyond = [edge.partner for edge in (gate.next, gate.previous, gate)]
+        beyond = []
+        self.take_out(gate.face)
+        for corner in filter(None, closed):
+            self.take_out(corner.face)
+        for face, corner in enumerate(closed):
+            face_corners = corners[(face + 1) % 3], corners[(face + 2) % 3], corners[3]
+            if corner is not None:
+                beyond.append([edge.partner for edge in (corner.next, corner, corner.previous)])
+            elif self.is_walled(face_corners):
+                beyond.append([None] * 3)
+            else:
+                assert not is_there[face], "one open face with these corners"
+                opened = self.open_face(face_corners, tet)
+                beyond.append([Edge(opened, place) for place in range(3)])
+        for face, corner in enumerate(closed):
+            if corner is None or gate_beyond[face] != corner.next:
+                pair(gate_beyond[face], beyond[face][0])
+        for place in range(3):
+            towards, back = (place + 1) % 3, (place + 2) % 3
+            one, other = beyond[towards][1], beyond[back][2]
+            if closed[towards] is None and closed[back] is None and spokes[place] is not None:
+                known, partner = spokes[place], spokes[place].partner
+                along = known.vertex == corners[place]
+                pair(one, partner if along else known)
+                pair(other, known if along else partner)
+            elif closed[towards] is None or closed[back] is None or one != closed[back].previous:
+                pair(one, other)
 
     def take_out(self, face):
-        del self.by_corners[self.key(face.corners)]
         for v in face.corners:
             self.open[v].remove(face)
 
-    def parse_label(self, corners, gate, facing):
-        before, agree, differ = None, 0, 0
-        if gate is not None:
-            before = self.tet_labels[gate.tet]
-        for face in facing:
-            if face is not None and face is not gate:
-                if self.tet_labels[face.tet] == before:
-                    agree = min(agree + 1, 3)
-                else:
-                    differ = min(differ + 1, 3)
+    def give_up(self, face):
+        for partner in face.across:
+            pair(partner, None)
+        self.take_out(face)
+
+    def parse_label(self, corners, before, closed):
         youngest = [[self.wedges[w][1] for w in self.wedges_at[v][-8:]] for v in corners]
-        if gate is not None:
+        if before is not None:
+            if self.uniform:
+                return before
+            agreeing = [self.tet_labels[corner.face.tet] == before for corner in closed if corner is not None]
             boundary = sum(len(labels) > 1 for labels in youngest[:3])
-            if self.coder.bit("same", boundary, agree, differ):
+            if self.coder.bit("same", boundary, sum(agreeing), len(agreeing) - sum(agreeing)):
                 return before
         counts = {}
         for labels in youngest:
@@ -476,10 +593,7 @@ class Slab:
         return self.labels - 1
 
     def parse_color(self, wedge):
-        around = []
-        for tet in reversed(self.stars[self.wedges[wedge][0]][-256:]):
-            if wedge in self.tet_wedges[tet]:
-                around += [w for w in self.tet_wedges[tet] if w < wedge]
+        around = self.neighbours.get(wedge, [])[-256:]
         known = [(self.colors[w], self.misses[w]) for w in around]
         if not known and wedge:
             known = [(self.colors[wedge - 1], (0, 0))]
@@ -520,8 +634,8 @@ class Slab:
     def parse_position(self, gate, corners, across):
         a, b, c = points = [self.positions[v] for v in corners]
         e = self.positions[next(v for v in self.tets[gate.tet] if v not in corners)]
-        extent = tuple(float(x) / 48.0 for x in self.extent(corners))
-        n = unit_normal(a, b, c, extent)
+        extent = tuple(f32(f32(x) / 48.0) for x in self.extent(corners))
+        n = unit_normal(a, b, c, self.extent(corners))
         predicted = []
         for i in range(3):
             s = a[i] + b[i] + c[i]
@@ -529,7 +643,8 @@ class Slab:
             for weight, vertex in zip((4, 2, 1), across):
                 if vertex is not None:
                     ahead += weight * (3 * self.positions[vertex][i] - s)
-            predicted.append(floor(((s / 3.0 + ahead / 48.0) + (0.625 * extent[i]) * n[i]) + 0.5))
+            center = f32(f32(f32(s) / 3.0) + f32(f32(ahead) / 48.0))
+            predicted.append(floor(f32(f32(center + f32(f32(0.625 * extent[i]) * n[i])) + 0.5)))
         last = max(range(3), key=lambda i: abs(n[i]))
         position = [None, None, None]
         for axis in [i for i in range(3) if i != last] + [last]:
@@ -537,10 +652,15 @@ class Slab:
             if side is not None:
                 position[axis] = side
             elif axis != last:
-                position[axis] = predicted[axis] + self.coder.int("free", axis, scale_class(extent[axis]))
+                scale = scale_class(extent[axis])
+                position[axis] = predicted[axis] + self.low_digits(self.coder.int("free", axis, scale), scale)
             else:
                 position[axis] = self.parse_height(points, position, axis, (predicted[axis], extent[axis], n[axis]))
         return tuple(position)
+
+    def low_digits(self, high, scale):
+        digits = max(0, scale // 2 - 1)
+        return (high << digits) + self.coder.decoder.raw(digits)
 
     def parse_side(self, axis, points, predicted, extent):
         high = self.far()[axis] if axis < 2 or self.duration is not None else None
@@ -548,7 +668,7 @@ class Slab:
             if place is None:
                 continue
             beyond = predicted if side == 0 else high - predicted
-            nearness = 0 if beyond <= 0 else 1 if beyond <= extent else 2
+            nearness = 0 if beyond <= 0 else 1 if f32(beyond) <= extent else 2
             if self.coder.bit("on side", axis, side, sum(p[axis] == place for p in points), nearness):
                 return place
         return None
@@ -561,13 +681,14 @@ class Slab:
         rest = sum(plane[i] * (position[i] - a[i]) for i in range(3) if i != axis)
         # The first with plane * (coordinate - a) > -rest.
         nearest = a[axis] + direction * (-rest // abs(plane[axis]) + 1)
-        w = extent / abs(n)
-        m = floor(max(0.0, min(4.0, (predicted - nearest) * direction / w * 4.0)))
-        return nearest + direction * self.coder.uint("height", axis, scale_class(w), m)
+        w = f32(extent / abs(n))
+        m = floor(max(0.0, min(4.0, f32(f32(f32((predicted - nearest) * direction) / w) * 4.0))))
+        scale = scale_class(w)
+        return nearest + direction * self.low_digits(self.coder.uint("height", axis, scale, m), scale)
 
 
 def scale_class(length):
-    return min(39, log2(floor(max(1.0, length * length))))
+    return min(39, log2(floor(max(1.0, f32(length * length)))))
 
 
 # Sections 1 and 2: packets
@@ -599,8 +720,8 @@ def parse_header(data):
 def packets(stream):
     at = 0
     while at < len(stream):
-        keyframe = stream[at : at + 8] == b"\x89TETV\r\n\x03"
-        assert keyframe or stream[at : at + 4] == b"\x89TVP", "a start code of version 3"
+        keyframe = stream[at : at + 8] == b"\x89TETV\r\n\x04"
+        assert keyframe or stream[at : at + 4] == b"\x89TVP", "a start code of version 4"
         start = at + (8 if keyframe else 4)
         flags, length, frame, check = struct.unpack_from("<BIQH", stream, start)
         packet = stream[at : at + length]

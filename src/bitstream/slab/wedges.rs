@@ -7,7 +7,8 @@ use glam::Vec3;
 
 use crate::bitstream::colors::{Around, KnownColor, code_color, from_grains};
 use crate::bitstream::extents::size_of;
-use crate::bitstream::labels::{LabelContext, code_label};
+use crate::bitstream::front::Met;
+use crate::bitstream::labels::SameContext;
 use crate::bitstream::vertices::Wedges;
 use crate::mesh::{VertexId, Wedge, WedgeId};
 use crate::video::Label;
@@ -20,38 +21,73 @@ const MAX_WEDGES_A_VERTEX: u16 = 1 << 8;
 /// Wedges of a corner that are looked at to find candidates for a label.
 const LABEL_SCAN: usize = 8;
 
-/// Tets around a vertex that are looked at to predict a colour.
-const STAR_SCAN: u32 = 256;
+/// Neighbours of a wedge that its colour is predicted from, at most.
+const NEIGHBOUR_SCAN: usize = 256;
+
+/// The edges of a tet, by its corners.
+const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
+/// All of them, as bits.
+const ALL_EDGES: u8 = 0b111111;
+
+/// Which of them each face has, as bits.
+const FACE_EDGES: [u8; 4] = [0b111000, 0b100110, 0b010101, 0b001011];
 
 impl Slab {
-    /// Codes the label of the tet with these corners; `facing` are the open faces that it will close.
+    /// Codes the label of the tet with these corners, `before` being the label before its gate.
+    #[inline]
     pub(super) fn code_tet_label(
         &mut self,
         side: &mut impl Side,
         corners: [VertexId; 4],
-        gate: Option<u32>,
-        facing: [Option<u32>; 4],
+        before: Option<u32>,
+        closed: &[Option<u32>; 3],
     ) -> Result<u32, MeshFault> {
-        let label_of = |face: u32| self.front.face(face).behind.label;
-        let mut context = LabelContext { before: gate.map(label_of), ..LabelContext::default() };
-        for other in facing.into_iter().flatten().filter(|&face| Some(face) != gate) {
-            if Some(label_of(other)) == context.before {
-                context.agreeing = (context.agreeing + 1).min(3);
-            } else {
-                context.differing = (context.differing + 1).min(3);
+        if let Some(before) = before.filter(|_| self.is_uniform) {
+            return Ok(before);
+        }
+        let count = self.labels;
+        let truth = side.label(count);
+        if let Some(before) = before {
+            let context = self.label_context(corners, before, closed);
+            if self.models.labels.code_same(side, context, truth == before) {
+                return Ok(before);
             }
         }
-        // Other labels with the number of corners that have them.
         let mut others = [(0, 0); 4 * LABEL_SCAN];
+        let others = self.other_labels(corners, before, &mut others);
+        let label = self.models.labels.code_other(side, others, count, truth)?;
+        if label >= self.limits.max_labels {
+            return Err(MeshFault::TooMany { field: "labels", limit: self.limits.max_labels });
+        }
+        Ok(label)
+    }
+
+    /// What tells whether the tet has the label before its gate.
+    #[inline]
+    fn label_context(&self, [a, b, c, _]: [VertexId; 4], before: u32, closed: &[Option<u32>; 3]) -> SameContext {
+        let agreeing = closed.iter().filter(|&&label| label == Some(before)).count();
+        let is_boundary = |vertex: VertexId| usize::from(self.vertices[vertex].wedges.count > 1);
+        SameContext {
+            boundary_corners: is_boundary(a) + is_boundary(b) + is_boundary(c),
+            agreeing,
+            differing: closed.iter().flatten().count() - agreeing,
+        }
+    }
+
+    /// Labels at the corners but for the one before the gate, with the number of corners that have them: the most likely
+    /// first.
+    #[inline(never)]
+    fn other_labels<'a>(
+        &self,
+        corners: [VertexId; 4],
+        before: Option<u32>,
+        others: &'a mut [(u32, u32); 4 * LABEL_SCAN],
+    ) -> &'a [(u32, u32)] {
         let mut length = 0;
-        for (corner, vertex) in corners.into_iter().enumerate() {
-            let known = self.vertices[vertex].wedges;
-            context.boundary_corners += usize::from(corner < 3 && known.count > 1);
-            if known.count == 1 && Some(known.label) == context.before {
-                continue;
-            }
+        for vertex in corners {
             for (_, label) in self.wedges_at(vertex).take(LABEL_SCAN) {
-                if Some(label) == context.before {
+                if Some(label) == before {
                     continue;
                 }
                 match others[..length].iter_mut().find(|(known, _)| *known == label) {
@@ -64,14 +100,7 @@ impl Slab {
             }
         }
         others[..length].sort_unstable_by_key(|&(label, count)| (u32::MAX - count, label));
-        context.candidates = &others[..length];
-        let count = self.last_wedge.len() as u32;
-        let truth = side.label(count);
-        let label = code_label(side, &mut self.models.labels, &context, count, truth)?;
-        if label >= self.limits.max_labels {
-            return Err(MeshFault::TooMany { field: "labels", limit: self.limits.max_labels });
-        }
-        Ok(label)
+        &others[..length]
     }
 
     /// Wedges of `vertex` and their labels, the youngest first.
@@ -86,36 +115,38 @@ impl Slab {
         })
     }
 
-    /// The wedge of `vertex` that has this label.
-    fn wedge_of(&self, vertex: VertexId, label: u32) -> Option<u32> {
-        let known = self.vertices[vertex].wedges;
-        if known.count > 0 && known.label == label {
-            return Some(known.youngest);
-        }
-        self.wedges_at(vertex).find(|&(_, other)| other == label).map(|(wedge, _)| wedge)
-    }
-
-    /// The tet's wedges; codes the colours of those that do not exist yet.
+    /// The tet's wedges; those that do not exist yet are made.
+    #[inline]
     pub(super) fn code_wedges(
         &mut self,
         side: &mut impl Side,
         corners: [VertexId; 4],
         label: u32,
     ) -> Result<[WedgeId; 4], MeshFault> {
-        let mut wedges = [None; 4];
+        let mut wedges = [WedgeId(0); 4];
         for (slot, vertex) in wedges.iter_mut().zip(corners) {
-            *slot = self.wedge_of(vertex, label);
-            if slot.is_none() && self.vertices[vertex].wedges.count >= MAX_WEDGES_A_VERTEX {
-                return Err(MeshFault::TooMany { field: "labels at a vertex", limit: MAX_WEDGES_A_VERTEX.into() });
-            }
+            let known = self.vertices[vertex].wedges;
+            let wedge = if known.count > 0 && known.label == label {
+                known.youngest
+            } else {
+                self.find_or_make_wedge(side, vertex, label)?
+            };
+            *slot = WedgeId(wedge);
         }
-        for (slot, vertex) in wedges.iter_mut().zip(corners) {
-            if slot.is_none() {
-                *slot = Some(self.push_wedge(vertex, label)?);
-                side.wedge_made(vertex);
-            }
+        Ok(wedges)
+    }
+
+    #[inline(never)]
+    fn find_or_make_wedge(&mut self, side: &mut impl Side, vertex: VertexId, label: u32) -> Result<u32, MeshFault> {
+        if let Some((wedge, _)) = self.wedges_at(vertex).find(|&(_, other)| other == label) {
+            return Ok(wedge);
         }
-        Ok(wedges.map(|w| WedgeId(w.unwrap_or(0))))
+        if self.vertices[vertex].wedges.count >= MAX_WEDGES_A_VERTEX {
+            return Err(MeshFault::TooMany { field: "labels at a vertex", limit: MAX_WEDGES_A_VERTEX.into() });
+        }
+        let wedge = self.push_wedge(vertex, label)?;
+        side.wedge_made(vertex);
+        Ok(wedge)
     }
 
     fn push_wedge(&mut self, vertex: VertexId, label: u32) -> Result<u32, MeshFault> {
@@ -125,12 +156,35 @@ impl Slab {
         let wedge = self.mesh.push_wedge(Wedge { vertex, label: Label(label), color: Vec3::ZERO });
         let known = &mut self.vertices[vertex].wedges;
         self.wedge_next.push(known.youngest);
+        self.neighbours.push_wedge();
         *known = Wedges { youngest: wedge.0, label, count: known.count + 1 };
-        match self.last_wedge.get_mut(label as usize) {
-            Some(last) => *last = wedge.0,
-            None => self.last_wedge.push(wedge.0),
-        }
+        self.labels = self.labels.max(label + 1);
         Ok(wedge.0)
+    }
+
+    /// Labels before the faces that a tet closes but for the gate.
+    #[inline]
+    pub(super) fn closed_labels(&self, met: &Met) -> [Option<u32>; 3] {
+        if self.labels == 1 {
+            return met.closed.map(|face| face.is_some().then_some(0));
+        }
+        met.closed.map(|face| face.is_some().then(|| self.front.before(face).label))
+    }
+
+    /// Notes which wedges of a tet are neighbours from now on: those of edges that no tet before it has, as far as the
+    /// faces tell that it closes; `closed` are the labels before them.
+    #[inline]
+    pub(super) fn note_neighbours(&mut self, wedges: [WedgeId; 4], label: u32, closed: &[Option<u32>; 4]) {
+        let mut known = 0;
+        for (closed, edges) in closed.iter().zip(FACE_EDGES) {
+            known |= if *closed == Some(label) { edges } else { 0 };
+        }
+        let mut new = !known & ALL_EDGES;
+        while new != 0 {
+            let [a, b] = EDGES[new.trailing_zeros() as usize % EDGES.len()];
+            new &= new - 1;
+            self.neighbours.push(wedges[a].0, wedges[b].0);
+        }
     }
 
     /// Codes the colours of all wedges that have none yet.
@@ -144,22 +198,15 @@ impl Slab {
             self.mesh.wedges[wedge].color = from_grains(color);
             self.known.push(KnownColor::new(color, misses));
         }
+        self.neighbours.clear(self.mesh.wedges.len() as u32);
         Ok(())
     }
 
     /// What the colour of the next wedge is predicted from.
     fn around(&self, wedge: usize) -> Around {
         let mut around = Around::default();
-        let Wedge { vertex, .. } = self.mesh.wedges[wedge];
-        for tet in self.stars.runs(self.vertices[vertex].star, STAR_SCAN).flatten() {
-            let wedges = self.mesh.tets[*tet as usize].map(WedgeId::index);
-            if !wedges.contains(&wedge) {
-                continue;
-            }
-            // Taken in as nothing, not passed over: whether a wedge is known is as good as random.
-            for other in wedges {
-                around.add(self.known.get(other).copied().unwrap_or_default());
-            }
+        for other in self.neighbours.of(wedge as u32).take(NEIGHBOUR_SCAN) {
+            around.add(self.known[other as usize]);
         }
         if around.is_empty() && wedge > 0 {
             around.add(self.known[wedge - 1].without_misses());
