@@ -118,6 +118,37 @@ proptest! {
 }
 
 #[test]
+fn cuts_lie_on_an_edge_that_moves_by_less_than_a_pixel() {
+    // Everything left of x = 20.2 + 0.3 y + 0.4 t is bright; pixels are means over their squares.
+    let beyond = |x: f32, y: f32, t: f32| x - 20.2 - 0.3 * y - 0.4 * t;
+    let part = |x: u32, y: u32, t: u32| {
+        let sample = |n: u32| beyond(x as f32 + (n % 16) as f32 / 16.0, y as f32 + (n / 16) as f32 / 16.0, t as f32);
+        (0..256).filter(|&n| sample(n) < 0.0).count() as f32 / 256.0
+    };
+    let level = |x, y, t| [(30.0 + 200.0 * part(x, y, t)) as u8; 3];
+    let mut clip = Clip::new([48, 32, 9], level, |x, y, t| u32::from(part(x, y, t) >= 0.5));
+    for plane in &mut clip.labels {
+        let pure = Frame::from_fn(48, 32, |x, y| [[30, 230][plane.label(x, y).0 as usize]; 3]).unwrap();
+        *plane = plane.clone().with_pure_colors(pure);
+    }
+    let lattice = clip.lattices(&[8], 0.02).remove(0);
+    let unit = lattice.domain.unit() as f32;
+    let (mut squares, mut count) = (0.0, 0);
+    for cut in &lattice.cuts {
+        let [a, b] = cut.edge.map(|v| lattice.positions[v as usize].as_vec3() / unit);
+        let at = a.lerp(b, cut.share);
+        if at.min_element() >= 0.0 && (2.0..46.0).contains(&at.x) && (2.0..30.0).contains(&at.y) {
+            squares += beyond(at.x, at.y, at.z).powi(2);
+            count += 1;
+            assert!(beyond(at.x, at.y, at.z).abs() < 0.45, "{at}");
+            assert!(cut.colors.iter().all(|c| (c.x - 30.0).abs() < 1.0 || (c.x - 230.0).abs() < 1.0), "{cut:?}");
+        }
+    }
+    let rms = (squares / count as f32).sqrt();
+    assert!(count > 50 && rms < 0.1, "{count} cuts, {rms} px off");
+}
+
+#[test]
 fn nothing_to_see_needs_only_the_coarsest_cells() {
     let clip = Clip::new([64, 48, 17], |_, _, _| [90, 100, 110], |_, _, _| 0);
     let mesh = clip.mesh(&[8, 8], 0.5);

@@ -11,7 +11,6 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use super::pure::pure_colors;
 use super::{Frame, Label, LabelPlane};
 
 /// Least squared difference of pure colours, in squared levels over the channels, that tells how much of each a pixel has.
@@ -35,18 +34,13 @@ pub struct Edges {
 }
 
 impl Edges {
-    /// The edges of a frame.
-    pub fn new(frame: &Frame, labels: &LabelPlane) -> Self {
-        let pure = labels.pure_colors().cloned().unwrap_or_else(|| Arc::new(pure_colors(frame, labels)));
+    /// The edges of a frame, if the pure colours of its labels are known.
+    pub fn new(frame: &Frame, labels: &LabelPlane) -> Option<Self> {
+        let pure = labels.pure_colors()?.clone();
         let mut edges = Self { labels: labels.clone(), pure, parts: Vec::new() };
         let pixels = (0..frame.height()).flat_map(|y| (0..frame.width()).map(move |x| [x, y]));
         edges.parts = pixels.map(|p| edges.part_of(frame, p)).collect();
-        edges
-    }
-
-    /// The colour that each pixel's label has there where no other shows through.
-    pub fn pure(&self) -> &Arc<Frame> {
-        &self.pure
+        Some(edges)
     }
 
     /// How far from pixel `p` to its neighbour `q`, which has another label, their edge is: between 0 and 1. Halfway where
@@ -185,7 +179,8 @@ mod tests {
             let frame = Frame::from_fn(40, 40, |x, y| [level(x, y); 3]).expect("size");
             let label = |n: u32| Label(u32::from(part(n % 40, n / 40) >= 0.5));
             let labels = LabelPlane::new(40, 40, (0..1600).map(label).collect());
-            let edges = Edges::new(&frame, &labels);
+            let pure = Frame::from_fn(40, 40, |x, y| [[40, 200][usize::from(part(x, y) >= 0.5)]; 3]).expect("size");
+            let edges = Edges::new(&frame, &labels.clone().with_pure_colors(pure)).expect("colours");
             let mut worst = 0.0f32;
             for y in 10..30 {
                 for x in 10..30 {

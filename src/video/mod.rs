@@ -7,7 +7,6 @@ mod convert;
 mod edges;
 mod frame;
 mod label;
-mod pure;
 mod surface;
 mod volume;
 

@@ -62,8 +62,8 @@ struct Layer {
     pyramid: [Grid; LEVELS],
     labels: LayerLabels,
     importance: Importance,
-    /// Of each plane, where labels differ.
-    edges: Vec<Edges>,
+    /// Of each plane, where they are known.
+    edges: Vec<Option<Edges>>,
 }
 
 impl AdaptiveLattice {
@@ -142,13 +142,12 @@ impl AdaptiveLattice {
             Axis::of_pixels(self.domain.height, unit),
             Axis::of_planes(times),
         ];
-        let is_cut = !labels.iter().all(LabelPlane::is_uniform);
-        let planes: Vec<(&Arc<Frame>, &LabelPlane)> =
-            if is_cut { frames.iter().zip(labels).collect() } else { Vec::new() };
-        let edges: Vec<Edges> = map(planes, |(frame, labels)| Edges::new(frame, labels));
+        let planes: Vec<(&Arc<Frame>, &LabelPlane)> = frames.iter().zip(labels).collect();
         // What is blended at edges is for the cuts to say.
-        let pure: Vec<Arc<Frame>> = edges.iter().map(|edges| edges.pure().clone()).collect();
-        let pyramid = pyramid(&axes, if is_cut { &pure } else { frames });
+        let pure: Vec<Arc<Frame>> =
+            planes.iter().map(|(frame, labels)| labels.pure_colors().unwrap_or(frame).clone()).collect();
+        let edges = map(planes, |(frame, labels)| Edges::new(frame, labels));
+        let pyramid = pyramid(&axes, &pure);
         let mut importance = Importance::of_colors(&axes, &pyramid);
         importance.saturate();
         let frames = f64::from(times[times.len() - 1] - times[0]) / f64::from(unit);
@@ -238,7 +237,7 @@ impl Layer {
     }
 
     /// How far from its first sample to the next a crossing lies: within a plane where the edge is, from one plane to
-    /// another by how far the edge is in each. Halfway at lines between pixels.
+    /// another by how far the edge is in each. Halfway where that is not known.
     fn share(&self, crossing: &Crossing) -> f32 {
         let pixel = |vertex: [usize; 3]| {
             let [x, y, t] = std::array::from_fn(|axis| self.axes[axis].lines()[vertex[axis]].sample());
@@ -246,12 +245,13 @@ impl Layer {
         };
         let [first, second] = crossing.samples.map(pixel);
         let (Some((p, before)), Some((q, after))) = (first, second) else { return 0.5 };
-        let edges = [before, after].map(|plane| &self.edges[plane]);
+        let edges = [before, after].map(|plane| self.edges[plane].as_ref());
         if before == after {
-            return if p == q { 0.5 } else { edges[0].share(p, q) };
+            return edges[0].filter(|_| p != q).map_or(0.5, |edges| edges.share(p, q));
         }
-        let distances = [edges[0].distance(p, crossing.labels[1]), edges[1].distance(q, crossing.labels[0])];
-        (distances[0] / (distances[0] + distances[1])).clamp(MARGIN, 1.0 - MARGIN)
+        let [from_p, from_q] = [(edges[0], p, crossing.labels[1]), (edges[1], q, crossing.labels[0])]
+            .map(|(edges, at, label)| edges.map_or(1.0, |edges| edges.distance(at, label)));
+        (from_p / (from_p + from_q)).clamp(MARGIN, 1.0 - MARGIN)
     }
 
     fn color(&self, vertex: [usize; 3], level: u8) -> Vec3 {

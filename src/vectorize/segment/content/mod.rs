@@ -103,7 +103,8 @@ impl Content {
                 });
                 let names = self.palette.name(self.raster, frame, &pixels, &regions, before);
                 let labels = pixels.iter().map(|pixel| Label(names[pixel.region as usize])).collect();
-                LabelPlane::new(frame.width(), frame.height(), labels).with_pure_colors(pure_colors(frame, &pixels))
+                let plane = LabelPlane::new(frame.width(), frame.height(), labels);
+                if regions.areas.len() > 1 { plane.with_pure_colors(pure_colors(frame, &pixels)) } else { plane }
             }
         };
         self.before = Some((frame.clone(), levels, plane.clone()));
