@@ -25,10 +25,14 @@ fn pictures(packets: &Outcome) -> Vec<gst::Buffer> {
     packets.buffers().filter(is_picture).map(|buffer| buffer.copy_deep().expect("a copy")).collect()
 }
 
+/// The frame number that a buffer's stamp says.
+fn number(buffer: &gst::BufferRef) -> u64 {
+    buffer.pts().expect("a stamp").nseconds() * pipeline::RATE / 1_000_000_000
+}
+
 /// Frame numbers of the pictures that are out.
 fn shown(harness: &mut gst_check::Harness) -> Vec<u64> {
-    let number = |buffer: gst::Buffer| buffer.pts().expect("a stamp").nseconds() * pipeline::RATE / 1_000_000_000;
-    std::iter::from_fn(|| harness.try_pull()).map(number).collect()
+    std::iter::from_fn(|| harness.try_pull()).map(|buffer| number(&buffer)).collect()
 }
 
 fn push(harness: &mut gst_check::Harness, packets: &[gst::Buffer]) {
@@ -63,7 +67,7 @@ fn nothing_waits_where_upstream_has_nothing_in_store() {
         std::thread::sleep(PAUSE);
         push(&mut harness, std::slice::from_ref(packet));
         out.extend(shown(&mut harness));
-        assert_eq!(out.last(), Some(&(packet.pts().expect("a stamp").nseconds() * pipeline::RATE / 1_000_000_000)));
+        assert_eq!(out.last(), Some(&number(packet)));
     }
     assert_eq!(out, (0..8).collect::<Vec<_>>());
 }

@@ -4,6 +4,8 @@
 //! elsewhere in the frame. What lies around them cannot explain them, and by themselves they do not say how much of
 //! them is what.
 
+use std::collections::VecDeque;
+
 use glam::Vec3;
 
 use super::super::raster::Raster;
@@ -39,6 +41,8 @@ pub(super) struct Inks {
     inks: Vec<Ink>,
     /// The ink of each zone, if it has one.
     of_zone: Vec<Option<usize>>,
+    /// Fewest pixels of an ink that is looked for elsewhere.
+    least: usize,
 }
 
 impl Inks {
@@ -68,17 +72,12 @@ impl Inks {
             }
         }
         let least = LEAST_PIXELS.max((LEAST_SHARE * colors.len() as f32) as usize);
-        let kept: Vec<Option<usize>> = inks
-            .iter()
-            .scan(0, |next, ink| {
-                let is_kept = ink.pixels >= least;
-                *next += usize::from(is_kept);
-                Some(is_kept.then(|| *next - 1))
-            })
-            .collect();
-        inks.retain(|ink| ink.pixels >= least);
-        let of_zone = of_zone.into_iter().map(|ink: Option<usize>| ink.and_then(|ink| kept[ink])).collect();
-        Self { inks, of_zone }
+        Self { inks, of_zone, least }
+    }
+
+    /// The inks that are pure on enough pixels to be looked for elsewhere.
+    fn common(&self) -> Vec<usize> {
+        (0..self.inks.len()).filter(|&n| self.inks[n].pixels >= self.least).collect()
     }
 
     /// Gives zones to pixels that are mostly an ink, which zones around (`near`, by pixel) do not explain as well
@@ -90,9 +89,10 @@ impl Inks {
         colors: &mut [Vec3],
         (near, blends): (&[Vec<Candidate>], &[Option<Blend>]),
     ) {
+        let common = self.common();
         let possible: Vec<Vec<Trace>> = (0..raster.len())
             .map(|p| match zones.of_pixel[p] {
-                IMPURE => self.possible(colors[p], &near[p], blends[p]),
+                IMPURE => self.possible(&common, colors[p], &near[p], blends[p]),
                 _ => Vec::new(),
             })
             .collect();
@@ -127,8 +127,8 @@ impl Inks {
         }
     }
 
-    /// The inks that a pixel may have a part of, if they explain it better than what is around, the best first.
-    fn possible(&self, color: Vec3, near: &[Candidate], blend: Option<Blend>) -> Vec<Trace> {
+    /// Which of the common inks a pixel may have a part of, if they explain it better than what is around, the best first.
+    fn possible(&self, common: &[usize], color: Vec3, near: &[Candidate], blend: Option<Blend>) -> Vec<Trace> {
         let most = RESIDUE.min(blend.map_or(f32::INFINITY, |blend| blend.error / BETTER));
         let candidate = |n: usize| Candidate { region: IMPURE, color: self.inks[n].color };
         let mut best: Vec<Option<(f32, f32)>> = vec![None; self.inks.len()];
@@ -137,7 +137,7 @@ impl Inks {
                 best[ink] = Some((error, part));
             }
         };
-        for n in 0..self.inks.len() {
+        for &n in common {
             for other in near {
                 let blend = Blend::of_two(color, candidate(n), *other, 0.0);
                 take(&mut best, blend.error, n, blend.part);
@@ -145,8 +145,8 @@ impl Inks {
         }
         if best.iter().all(Option::is_none) {
             // Two strokes side by side.
-            for n in 0..self.inks.len() {
-                for other in n + 1..self.inks.len() {
+            for (place, &n) in common.iter().enumerate() {
+                for &other in &common[place + 1..] {
                     let blend = Blend::of_two(color, candidate(n), candidate(other), 0.5);
                     let ink = if blend.major.color == self.inks[n].color { n } else { other };
                     take(&mut best, blend.error, ink, blend.part);
@@ -164,7 +164,7 @@ impl Inks {
 fn agree(raster: Raster, possible: &[Vec<Trace>]) -> Vec<Option<Trace>> {
     let mut traces: Vec<Option<Trace>> =
         possible.iter().map(|found| if let [only] = found[..] { Some(only) } else { None }).collect();
-    let mut waiting: std::collections::VecDeque<usize> =
+    let mut waiting: VecDeque<usize> =
         (0..raster.len()).filter(|&p| traces[p].is_some_and(|trace| trace.part >= STROKE_PART)).collect();
     while let Some(p) = waiting.pop_front() {
         let Some(own) = traces[p] else { continue };

@@ -13,7 +13,7 @@ mod zones;
 
 use merge::{MergeRules, Mixed, merge};
 use naming::{Before, Palette};
-use unmix::{unmix, unmix_with_inks};
+use unmix::Unmixing;
 use zones::find_zones;
 
 use super::SegmentParams;
@@ -82,13 +82,14 @@ impl Content {
         }
         let zones = find_zones(self.raster, frame);
         let jump = (NOISE_JUMP * zones.roughness(self.raster, frame)).clamp(LEAST_JUMP, self.params.jump_levels);
-        let mut pixels = unmix(self.raster, frame, &zones);
+        let unmixing = Unmixing::new(self.raster, frame, zones);
+        let mut pixels = unmixing.pixels();
         self.usual.learn(self.raster, &pixels, jump);
         let rules = MergeRules { jump, min_area: self.params.min_area_px, worth: self.params.jump_levels };
         let mut regions = merge(self.raster, &mut pixels, rules, self.usual);
         // What comes to one region is no drawing.
         if regions.areas.len() > 1 {
-            pixels = unmix_with_inks(self.raster, frame, zones);
+            pixels = unmixing.with_inks().pixels();
             regions = merge(self.raster, &mut pixels, rules, self.usual);
         }
         let levels = pyramid(frame);

@@ -74,50 +74,51 @@ impl Blend {
     }
 }
 
-/// Takes every pixel apart.
-pub(super) fn unmix(raster: Raster, frame: &Frame, zones: &Zones) -> Vec<Pixel> {
-    let colors = colors(frame);
-    take_apart(raster, &colors, &colors, zones)
-}
-
-/// The same of a drawing: strokes and small things may have colours that are pure elsewhere.
-pub(super) fn unmix_with_inks(raster: Raster, frame: &Frame, mut zones: Zones) -> Vec<Pixel> {
-    let colors = colors(frame);
-    let (near, blends) = accounts(raster, &colors, &colors, &zones);
-    let inks = Inks::new(&zones, &colors);
-    let mut pure = colors.clone();
-    inks.claim(raster, &mut zones, &mut pure, (&near, &blends));
-    take_apart(raster, &colors, &pure, &zones)
-}
-
-fn colors(frame: &Frame) -> Vec<Vec3> {
-    frame.pixels().iter().map(|c| Vec3::from_array(c.map(f32::from))).collect()
-}
-
-/// `pure` are the colours of zones' pixels.
-fn take_apart(raster: Raster, colors: &[Vec3], pure: &[Vec3], zones: &Zones) -> Vec<Pixel> {
-    let (near, blends) = accounts(raster, colors, pure, zones);
-    let strokes = Strokes::new(raster, zones, colors, &blends);
-    (0..raster.len())
-        .map(|p| match zones.of_pixel[p] {
-            IMPURE => strokes.account(raster, colors, p, &near[p], blends[p]),
-            zone => Pixel::pure(zone, pure[p]),
-        })
-        .collect()
-}
-
-/// What zones lie around each pixel that is of none, and its best blend of them.
-fn accounts(
+/// What zones lie around the pixels of a frame that are of none.
+pub(super) struct Unmixing {
     raster: Raster,
-    colors: &[Vec3],
-    pure: &[Vec3],
-    zones: &Zones,
-) -> (Vec<Vec<Candidate>>, Vec<Option<Blend>>) {
-    let near: Vec<Vec<Candidate>> = (0..raster.len())
-        .map(|p| if zones.of_pixel[p] == IMPURE { candidates(raster, pure, zones, p) } else { Vec::new() })
-        .collect();
-    let blends = (0..raster.len()).map(|p| best_blend(colors[p], &near[p])).collect();
-    (near, blends)
+    zones: Zones,
+    colors: Vec<Vec3>,
+    /// The colours of zones' pixels: an ink's where one claims them.
+    pure: Vec<Vec3>,
+    /// The zones around each pixel that is of none.
+    near: Vec<Vec<Candidate>>,
+    /// Its best blend of them.
+    blends: Vec<Option<Blend>>,
+}
+
+impl Unmixing {
+    pub(super) fn new(raster: Raster, frame: &Frame, zones: Zones) -> Self {
+        let colors: Vec<Vec3> = frame.pixels().iter().map(|c| Vec3::from_array(c.map(f32::from))).collect();
+        Self::of_zones(raster, zones, colors.clone(), colors)
+    }
+
+    fn of_zones(raster: Raster, zones: Zones, colors: Vec<Vec3>, pure: Vec<Vec3>) -> Self {
+        let near: Vec<Vec<Candidate>> = (0..raster.len())
+            .map(|p| if zones.of_pixel[p] == IMPURE { candidates(raster, &pure, &zones, p) } else { Vec::new() })
+            .collect();
+        let blends = (0..raster.len()).map(|p| best_blend(colors[p], &near[p])).collect();
+        Self { raster, zones, colors, pure, near, blends }
+    }
+
+    /// The same of a drawing: strokes and small things may have colours that are pure elsewhere.
+    pub(super) fn with_inks(self) -> Self {
+        let Self { raster, mut zones, colors, mut pure, near, blends } = self;
+        Inks::new(&zones, &colors).claim(raster, &mut zones, &mut pure, (&near, &blends));
+        Self::of_zones(raster, zones, colors, pure)
+    }
+
+    /// Takes every pixel apart.
+    pub(super) fn pixels(&self) -> Vec<Pixel> {
+        let Self { raster, zones, colors, pure, near, blends } = self;
+        let strokes = Strokes::new(*raster, zones, colors, blends);
+        (0..raster.len())
+            .map(|p| match zones.of_pixel[p] {
+                IMPURE => strokes.account(*raster, colors, p, &near[p], blends[p]),
+                zone => Pixel::pure(zone, pure[p]),
+            })
+            .collect()
+    }
 }
 
 /// The zones around a pixel, nearer pixels counting more.
