@@ -333,6 +333,28 @@ fn what_a_lens_blurs_is_no_jump() {
     }
 }
 
+/// Sides along the grid have one blend in each row, at any part of a pixel, and it goes to whoever has more of it.
+#[test]
+fn sides_along_the_grid_are_edges_wherever_they_are() {
+    let (left, right, floor) = (8.3f32, 14.6f32, 10.4f32);
+    let part = |n: u32, from: f32, to: f32| ((n as f32 + 1.0).min(to) - (n as f32).max(from)).clamp(0.0, 1.0);
+    let frame = Frame::from_fn(48, 24, |x, y| {
+        let (bar, sky) = (part(x, left, right), part(y, 0.0, floor));
+        let ground = |c: usize| sky * [150.0, 200.0, 235.0][c] + (1.0 - sky) * [85.0, 85.0, 90.0][c];
+        std::array::from_fn(|c| (bar * [110.0, 70.0, 40.0][c] + (1.0 - bar) * ground(c)).round() as u8)
+    });
+    let frame = frame.expect("size");
+    let plane = push_all(&mut Segmenter::new(48, 24, SegmentParams::new(0)), &[frame]).remove(0);
+    let [sky, bar, ground] = [plane.label(30, 4), plane.label(11, 4), plane.label(30, 18)];
+    assert_eq!(BTreeSet::from([sky, bar, ground]).len(), 3, "three colours");
+    for y in 0..10 {
+        assert_eq!([7, 8, 14, 15].map(|x| plane.label(x, y)), [sky, bar, bar, sky], "row {y}");
+    }
+    for x in 20..48 {
+        assert_eq!([9, 10].map(|y| plane.label(x, y)), [sky, ground], "column {x}");
+    }
+}
+
 /// A drawing: a black block, and black strokes of `width` pixels on grounds of two colours, which pass between the rows.
 fn stroke_frame(width: f32) -> Frame {
     let ground = |x: f32| if x < 48.0 { [150.0, 210.0, 240.0] } else { [250.0, 250.0, 245.0] };

@@ -26,8 +26,10 @@ const RESIDUE: f32 = 3.0 * 6.0 * 6.0;
 const LEAST_PART: f32 = 0.2;
 /// How much more of the ink than on one of its sides a pixel has there.
 const RIDGE: f32 = 0.1;
-/// A blend with an ink must have this many times less error than what is around explains.
+/// A blend with an ink must have this many times less error than what is around explains, beyond what rounding to levels
+/// makes of the best blend.
 const BETTER: f32 = 4.0;
+const ROUNDING: f32 = 1.0;
 
 /// A colour of the drawing.
 #[derive(Debug, Clone, Copy)]
@@ -129,7 +131,7 @@ impl Inks {
 
     /// Which of the common inks a pixel may have a part of, if they explain it better than what is around, the best first.
     fn possible(&self, common: &[usize], color: Vec3, near: &[Candidate], blend: Option<Blend>) -> Vec<Trace> {
-        let most = RESIDUE.min(blend.map_or(f32::INFINITY, |blend| blend.error / BETTER));
+        let most = RESIDUE.min(blend.map_or(f32::INFINITY, |blend| (blend.error - ROUNDING) / BETTER));
         let candidate = |n: usize| Candidate { region: IMPURE, color: self.inks[n].color };
         let mut best: Vec<Option<(f32, f32)>> = vec![None; self.inks.len()];
         let take = |best: &mut Vec<Option<(f32, f32)>>, error: f32, ink: usize, part: f32| {

@@ -42,6 +42,8 @@ struct Boundary {
     sides: u32,
     /// Sum over the pixels that both have a part of: from 0, next to nothing, to 1, half.
     mixed: f32,
+    /// How many these are.
+    blends: u32,
 }
 
 impl Boundary {
@@ -55,13 +57,17 @@ impl Boundary {
     /// One boundary alone says little, as one along the grid may have half of each pixel: it counts beside what is
     /// usual.
     fn is_sharp(&self, usual: Mixed) -> bool {
-        self.mixed + usual.sum <= WIDEST * (self.sides as f32 + usual.sides)
+        let sides = self.sides as f32 + usual.sides;
+        self.mixed + usual.sum <= WIDEST * sides || self.blends as f32 + usual.blends <= MOST_BLENDS * sides
     }
 }
 
 /// Most [`Boundary::mixed`] of a jump, a side. Where pixels are means over their squares, an edge along the grid has 2/3 a
 /// length; a side stands for 0.8 of an edge's length. Edges through a lens have 0.8 to 2 a length.
 const WIDEST: f32 = 0.65;
+/// Most blends of a jump, a side, however much they are mixed: edges along the grid have one a side wherever they are in their
+/// pixels, and those across it no more. Edges through a lens have 1.5 and more.
+const MOST_BLENDS: f32 = 1.1;
 
 /// How much is mixed at the boundaries of a slab so far.
 #[derive(Debug, Clone, Copy, Default)]
@@ -70,6 +76,8 @@ pub(super) struct Mixed {
     sides: f32,
     /// As [`Boundary::mixed`].
     sum: f32,
+    /// As [`Boundary::blends`].
+    blends: f32,
 }
 
 impl Mixed {
@@ -85,11 +93,13 @@ impl Mixed {
         for boundary in boundaries {
             self.sides += boundary.sides as f32;
             self.sum += boundary.mixed;
+            self.blends += boundary.blends as f32;
         }
         let around = (2 * (raster.width + raster.height)) as f32;
         let share = (around / self.sides.max(1.0)).min(1.0);
         self.sides *= share;
         self.sum *= share;
+        self.blends *= share;
     }
 }
 
@@ -171,6 +181,7 @@ fn survey(raster: Raster, pixels: &[Pixel], forest: &mut Forest, regions: usize)
         let (a, b) = (forest.root(pixel.region), forest.root(pixel.minor));
         if let Some(boundary) = boundaries.get_mut(&(a.min(b), a.max(b))) {
             boundary.mixed += 4.0 * pixel.part * (1.0 - pixel.part);
+            boundary.blends += 1;
         }
     }
     (boundaries, areas)
