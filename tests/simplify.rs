@@ -86,6 +86,8 @@ proptest! {
         share in 0.02f64..0.6,
         topology in prop::sample::select(vec![Topology::Free, Topology::Priced, Topology::Strict]),
         distance in any::<bool>(),
+        improve_at in prop::sample::select(vec![0.0f32, 0.7]),
+        improve_cost in prop::sample::select(vec![0.1f32, 1e6]),
     ) {
         let noise = |x: u32, y: u32, t: u32| {
             (x ^ y.rotate_left(9) ^ t.rotate_left(18) ^ seed).wrapping_mul(0x9e37_79b1) >> 24
@@ -93,6 +95,8 @@ proptest! {
         let clip = Clip::new(size, |x, y, t| [noise(x, y, t) as u8; 3], |x, y, t| noise(x / 2, y / 2, t / 2) % labels);
         let params = SimplifyParams {
             topology,
+            improve_at,
+            improve_cost,
             ..SimplifyParams::default()
         };
         let start = clip.whole();
@@ -152,7 +156,7 @@ fn frozen_vertices_stay() {
     let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
     work.append(&clip.whole(), &SimplifyParams { surface_weight: 100.0, ..SimplifyParams::default() });
     let unfrozen = Unfrozen { low: 2 * 8, high: 6 * 8 };
-    let params = SimplifyParams::default();
+    let params = SimplifyParams { improve_at: 0.8, improve_cost: 10.0, ..SimplifyParams::default() };
     let report = simplify(&mut work, unfrozen, goal(0), &params);
     let mut mesh = TetMesh::empty(clip.domain);
     work.commit(i32::MAX, &mut mesh);
@@ -172,7 +176,7 @@ fn frozen_vertices_stay() {
 #[test]
 fn windows_join_into_one_tiling() {
     let clip = Clip::new([10, 9, 13], textured, |x, y, t| u32::from((x + t) / 6 > y / 3));
-    let params = SimplifyParams { max_extent_frames: 4, ..SimplifyParams::default() };
+    let params = SimplifyParams { max_extent_frames: 4, improve_at: 0.8, ..SimplifyParams::default() };
     let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
     let mut mesh = TetMesh::empty(clip.domain);
     let mut low = -1;
@@ -228,6 +232,51 @@ fn a_stroke_stays_whole_at_a_price() {
     assert_eq!(report.vertices, 60, "a price is no refusal: {report:?}");
     let part = volume_of_label(&mesh, 1) as f64 / truth as f64;
     assert!((0.9..1.1).contains(&part), "{part} of the stroke is left");
+}
+
+/// A bar that moves by two pixels a frame before two grounds.
+fn moving_bar() -> Clip {
+    let label = |x: u32, y: u32, t: u32| if (4 + 2 * t..12 + 2 * t).contains(&x) { 2 } else { u32::from(y >= 10) };
+    let color = |x, y, t| [[90, 160, 220], [60, 60, 70], [200, 80, 20]][label(x, y, t) as usize];
+    Clip::new([40, 16, 11], color, label)
+}
+
+#[test]
+fn improving_moves_no_surface() {
+    let clip = moving_bar();
+    let mesh = |improves: bool| {
+        let mut work = WorkMesh::<ColorQuadric>::new(clip.domain);
+        work.append(&clip.whole(), &SimplifyParams::default());
+        simplify(&mut work, ALL, goal(1000), &SimplifyParams::default());
+        if improves {
+            let params = SimplifyParams { improve_at: 1.0, ..SimplifyParams::default() };
+            // Nothing costs nothing: so nothing collapses, but there is a goal to make room for.
+            let report = simplify(&mut work, ALL, Goal { max_cost: 0.0, ..goal(0) }, &params);
+            assert_eq!(report.collapses, 0);
+        }
+        let mut mesh = TetMesh::empty(clip.domain);
+        work.commit(i32::MAX, &mut mesh);
+        assert_eq!(validate(&mesh), Ok(()));
+        mesh
+    };
+    let (before, after) = (mesh(false), mesh(true));
+    assert_ne!(after.tets.len(), before.tets.len(), "edges were swapped");
+    for label in 0..3 {
+        assert_eq!(volume_of_label(&after, label), volume_of_label(&before, label));
+    }
+}
+
+#[test]
+fn what_moves_costs_less_with_improvement() {
+    let clip = moving_bar();
+    let cost = |improve_at| {
+        let params = SimplifyParams { topology: Topology::Priced, improve_at, ..SimplifyParams::default() };
+        let (mesh, report) = clip.simplified::<ColorQuadric>(200, &params);
+        assert_eq!(validate(&mesh), Ok(()));
+        report.max_cost
+    };
+    let (plain, improved) = (cost(0.0), cost(0.7));
+    assert!(improved < 0.7 * plain, "{improved} with, {plain} without");
 }
 
 #[test]

@@ -15,6 +15,7 @@ use crate::bitstream::{MAX_RINGS, Packet, SlabWriter, rings};
 use crate::mesh::{Domain, StarTable, TetMesh};
 use crate::vectorize::fit::{FitParams, FitReport, FitRequest, fit};
 use crate::vectorize::lattice::AdaptiveLattice;
+use crate::vectorize::segment::Flatness;
 use crate::vectorize::simplify::{
     BlockGoal, Goal, SimplifyParams, Topology, Unfrozen, WedgeQuadric, WorkMesh, simplify,
 };
@@ -29,6 +30,12 @@ const RUN_RATIO: f64 = 2.0;
 
 /// The same where labels differ: what blocks have frozen, planes dense with borders, lets less of them go cheaply.
 const CUT_RUN_RATIO: f64 = 4.0;
+
+/// [`SimplifyParams::improve_at`] where labels differ.
+const CUT_IMPROVE_AT: f32 = 0.7;
+
+/// One frame in so many says how flat labels are.
+const FLATNESS_EVERY: u32 = 4;
 
 /// How many times the vertices that a window is to have it may grow to before its blocks are simplified.
 const GROWTH: f64 = 1.5;
@@ -116,6 +123,8 @@ pub(super) struct SlabEncoder<Q> {
     topology: TopologyRule,
     /// Whether labels differ anywhere so far.
     is_cut: bool,
+    /// Of its labels, looked at in one frame of [`FLATNESS_EVERY`].
+    flatness: Flatness,
     simplify_params: SimplifyParams,
     fit_params: FitParams,
     work: WorkMesh<Q>,
@@ -160,8 +169,10 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             run_ratio: RUN_RATIO.max(refits::first_stage(refits)),
             topology: config.topology,
             is_cut: false,
+            flatness: Flatness::default(),
             simplify_params: SimplifyParams {
                 max_extent_frames: config.window,
+                topology: topology(config.topology, false),
                 // Made of colour errors, so no measure for distances.
                 surface_weight: match config.error_metric {
                     ErrorMetric::Color => SimplifyParams::default().surface_weight,
@@ -190,8 +201,18 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     }
 
     fn take(&mut self, frame: Arc<Frame>, labels: LabelPlane) {
-        self.is_cut |= !labels.is_uniform();
-        self.simplify_params.topology = self.topology();
+        let is_first_cut = !self.is_cut && !labels.is_uniform();
+        if is_first_cut {
+            self.is_cut = true;
+            self.simplify_params.topology = topology(self.topology, true);
+            self.simplify_params.improve_at = CUT_IMPROVE_AT;
+        }
+        if is_first_cut || (self.is_cut && self.planes.is_multiple_of(FLATNESS_EVERY)) {
+            self.flatness.look(&frame, &labels);
+            let factor = self.flatness.factor();
+            self.fit_params.gradient_factor = factor;
+            self.simplify_params.spread_weight = factor * SimplifyParams::default().spread_weight;
+        }
         self.volume.push(frame.clone());
         self.labels.push_back((self.planes, labels.clone()));
         self.runs.push(frame, labels);
@@ -226,16 +247,6 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         }
         let keep = self.run_ratio() * self.ratio * pixels / run.positions.len() as f64;
         BlockGoal { keep: keep.min(1.0), max_error: f32::INFINITY, shift: 0.0 }
-    }
-
-    /// What is kept of the topology of labels, as far as there are any.
-    fn topology(&self) -> Topology {
-        match self.topology {
-            // Of one label there is no more to keep than positive tets keep.
-            TopologyRule::Auto if self.is_cut => Topology::Priced,
-            TopologyRule::Auto | TopologyRule::Free => Topology::Free,
-            TopologyRule::Strict => Topology::Strict,
-        }
     }
 
     /// Vertices that the window may have over those that the simplification ratio allows, before the slab ends.
@@ -450,6 +461,16 @@ impl<Q: WedgeQuadric> WindowEncoder for SlabEncoder<Q> {
         let packets = self.advance(Some(frames), observer)?;
         let vertices = self.committed.positions.len() as u64;
         Ok(FinishedSlab { packets, vertices, error_gain: self.error_gain, error: self.proof.error() })
+    }
+}
+
+/// What is kept of the topology of labels, as far as there are any.
+fn topology(rule: TopologyRule, is_cut: bool) -> Topology {
+    match rule {
+        // Of one label there is no more to keep than positive tets keep.
+        TopologyRule::Auto if is_cut => Topology::Priced,
+        TopologyRule::Auto | TopologyRule::Free => Topology::Free,
+        TopologyRule::Strict => Topology::Strict,
     }
 }
 

@@ -1,6 +1,6 @@
 //! The box that a slab's mesh tiles, and the integer lattice its vertices live on.
 
-use glam::IVec3;
+use glam::{IVec3, Vec3};
 
 /// Sides of the box on which a vertex lies, one bit each. Each side counts as one more label in the paper's
 /// K-class rule (§V-B), so that edges and corners of the box stay fixed under subdivision.
@@ -39,6 +39,12 @@ impl Sides {
     /// Whether all of `other`'s sides are among these.
     pub fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
+    }
+
+    /// 1 for the axes along which a vertex may move without leaving one of its sides, 0 for the others.
+    pub fn free_axes(self) -> Vec3 {
+        let axis = |low: Self, high: Self| if self.0 & (low.0 | high.0) == 0 { 1.0 } else { 0.0 };
+        Vec3::new(axis(Self::X_LOW, Self::X_HIGH), axis(Self::Y_LOW, Self::Y_HIGH), axis(Self::T_LOW, Self::T_HIGH))
     }
 
     /// Whether the vertex lies on no side.

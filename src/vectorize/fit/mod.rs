@@ -25,7 +25,6 @@ mod patch;
 mod pin;
 mod planes;
 mod polygon;
-mod prior;
 mod quarters;
 mod refine;
 mod smoothness;
@@ -45,7 +44,6 @@ use evidence::{Beside, Evidence};
 use guard::Guard;
 use model::Model;
 use patch::Patch;
-use prior::gradient_factor;
 
 /// Subdivision masks reach one ring, so what a free vertex has a share in lies within one ring of it, and is exact if
 /// the tets of the next ring are there.
@@ -108,8 +106,6 @@ struct Fitting<'a> {
     report: FitReport,
     /// What the frames say at the present positions, if they have been looked at.
     seen: Option<Evidence>,
-    /// Factor on the price of gradients.
-    gradient_factor: f32,
 }
 
 impl<'a> Fitting<'a> {
@@ -120,9 +116,7 @@ impl<'a> Fitting<'a> {
         let model = Model::new(&patch.mesh, &patch.free, params.subdivision_levels);
         let colors = Colors::new(patch.mesh.wedges.iter().map(|w| w.color).collect(), &patch.free_wedges());
         let (frames, report) = (request.frames, FitReport::default());
-        let is_cut = patch.boundary.contains(&true);
-        let gradient_factor = if is_cut { gradient_factor(frames, request.labels) } else { 1.0 };
-        Ok(Self { patch, model, colors, frames, params, report, seen: None, gradient_factor })
+        Ok(Self { patch, model, colors, frames, params, report, seen: None })
     }
 
     fn surfaces(&mut self, labels: &[(u32, LabelPlane)]) {
@@ -154,7 +148,7 @@ impl<'a> Fitting<'a> {
         let all = self.params.position_iterations;
         // What gradients cost would hold the vertices of long slivers, and with them the mesh: only what flat labels add
         // counts, without which the colours of thin ones would make up for places.
-        let gradient_weight = self.params.gradient_weight * (self.gradient_factor - 1.0);
+        let gradient_weight = self.params.gradient_weight * (self.params.gradient_factor - 1.0);
         let fine = FitParams { position_iterations: all - all / 2, gradient_weight, ..self.params.clone() };
         let rough = FitParams { position_iterations: all / 2, quarter_weight: 0.0, ..fine.clone() };
         let guard = Guard::new(&self.patch.mesh, self.params.minimum_altitude);
@@ -196,7 +190,7 @@ impl<'a> Fitting<'a> {
     fn final_colors(&mut self) {
         // Where positions stay nothing can fit the quarters.
         let quarter_weight = if self.params.position_iterations > 0 { self.params.quarter_weight } else { 0.0 };
-        let gradient = self.params.gradient_weight * self.gradient_factor;
+        let gradient = self.params.gradient_weight * self.params.gradient_factor;
         let evidence = self.look(Beside { quarter: quarter_weight, gradient });
         self.colors.optimize(&self.model, &evidence, self.params.color_iterations, self.params);
         self.report.rms_after = self.rms(&evidence);

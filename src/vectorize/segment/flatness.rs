@@ -1,41 +1,52 @@
-//! What a change of colour within a label costs, from how much colours change within labels.
+//! How flat labels are: how much colours change within them.
 //!
-//! In: frames and their labels. Out: a factor on the price of gradients. Forbidden here: the mesh.
+//! In: frames and their labels. Out: a factor on what is asked of colours within labels. Forbidden here: the mesh.
 //!
-//! The price is a prior: the squared error that is expected of a pixel over the squared gradient that is. Where labels
-//! have one colour throughout, as in drawings, next to nothing but their means is to be fitted, and what pixels at edges
-//! say of a thin label's colours is mostly about where its edges are. One factor for all: labels' own, thin ones of which
-//! have no inside, gave 0.1 to 1 dB less.
+//! Where labels have one colour throughout, as in drawings, next to nothing but their means is to be fitted, and what pixels
+//! at edges say of a thin label's colours is mostly about where its edges are; so the fit prices gradients more. And what
+//! lies inside of them is there for the surfaces' sake alone, so that simplification has to keep it in proportion to them.
+//! One factor for all: labels' own, thin ones of which have no inside, gave 0.1 to 1 dB less.
 
-use crate::video::{Frame, LabelPlane, Volume};
+use crate::video::{Frame, LabelPlane};
 
 /// Part of the steps within labels, the smallest, that count: what is left are edges that labels do not follow.
 const PART: f64 = 0.75;
-/// Squared gradient at which the price is as it is without labels: that of camera pictures, in squared levels a channel.
+/// Squared gradient at which the factor is 1: that of camera pictures, in squared levels a channel.
 const USUAL: f64 = 1.0;
-/// Most that the price is multiplied by.
+/// Greatest factor.
 const MOST: f64 = 200.0;
-/// One frame in so many is looked at.
-const EVERY: usize = 4;
 
-/// How many times the price of gradients counts within labels.
-pub(super) fn gradient_factor(frames: &Volume, labels: &[(u32, LabelPlane)]) -> f32 {
-    // By size of the step, that of the largest channel.
-    let mut histogram = [0u64; 256];
-    for (number, plane) in labels.iter().step_by(EVERY) {
-        if let Some(frame) = frames.frame(*number) {
-            steps_inside(frame, plane, |step| histogram[step] += 1);
+/// What was seen of steps within labels.
+#[derive(Debug, Clone)]
+pub struct Flatness {
+    /// Steps by size, that of the largest channel.
+    histogram: [u64; 256],
+}
+
+impl Default for Flatness {
+    fn default() -> Self {
+        Self { histogram: [0; 256] }
+    }
+}
+
+impl Flatness {
+    /// Takes in a frame and its labels, which are of one size.
+    pub fn look(&mut self, frame: &Frame, labels: &LabelPlane) {
+        steps_inside(frame, labels, |step| self.histogram[step] += 1);
+    }
+
+    /// The usual squared gradient over that within these labels: 1 for camera pictures, 200 where labels have one colour each.
+    pub fn factor(&self) -> f32 {
+        let wanted = PART * self.histogram.iter().sum::<u64>() as f64;
+        let (mut taken, mut squares) = (0.0, 0.0);
+        for (step, &count) in self.histogram.iter().enumerate() {
+            let count = (count as f64).min(wanted - taken);
+            taken += count;
+            squares += count * (step * step) as f64;
         }
+        let squared_gradient = squares / taken.max(1.0);
+        (USUAL / squared_gradient.max(USUAL / MOST)).max(1.0) as f32
     }
-    let wanted = PART * histogram.iter().sum::<u64>() as f64;
-    let (mut taken, mut squares) = (0.0, 0.0);
-    for (step, &count) in histogram.iter().enumerate() {
-        let count = (count as f64).min(wanted - taken);
-        taken += count;
-        squares += count * (step * step) as f64;
-    }
-    let squared_gradient = squares / taken.max(1.0);
-    (USUAL / squared_gradient.max(USUAL / MOST)).max(1.0) as f32
 }
 
 /// Calls `found` with the step from each pixel to the one at its right where both lie inside a label: others are blends.
@@ -62,21 +73,19 @@ fn steps_inside(frame: &Frame, plane: &LabelPlane, mut found: impl FnMut(usize))
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
     use crate::video::Label;
 
     fn factor(color: impl Fn(u32, u32) -> u8) -> f32 {
         let frame = Frame::from_fn(64, 16, |x, y| [color(x, y); 3]).expect("a frame");
         let labels = (0..64 * 16).map(|n| Label(u32::from(n % 64 > 30))).collect();
-        let mut frames = Volume::new(0);
-        frames.push(Arc::new(frame));
-        gradient_factor(&frames, &[(0, LabelPlane::new(64, 16, labels))])
+        let mut flatness = Flatness::default();
+        flatness.look(&frame, &LabelPlane::new(64, 16, labels));
+        flatness.factor()
     }
 
     #[test]
-    fn flat_labels_pay_for_gradients_and_textured_ones_do_not() {
+    fn labels_of_one_colour_are_flat_and_textured_ones_are_not() {
         assert_eq!(factor(|x, _| if x > 30 { 200 } else { 10 }), MOST as f32);
         // A blend at the edge is not inside.
         assert_eq!(factor(|x, _| [10, 90, 200][usize::from(x > 29) + usize::from(x > 30)]), MOST as f32);

@@ -5,12 +5,14 @@
 //!
 //! Where a number of labels is asked for, they are temporal superpixels as in §III-A (`temporal`, a room of its own).
 //! Where labels are chosen by content (`content`, another), a discontinuity costs vertices, so there is one only where
-//! the picture jumps. `cut` finds scene cuts, `motion` where things went between two frames.
+//! the picture jumps. `cut` finds scene cuts, `motion` where things went between two frames,
+//! `flatness` how much colours change within labels.
 
 mod between;
 mod connect;
 mod content;
 mod cut;
+mod flatness;
 mod lab;
 mod metrics;
 mod motion;
@@ -24,6 +26,7 @@ mod tests;
 pub use between::{halfway, is_moving};
 use content::Content;
 use cut::SceneView;
+pub use flatness::Flatness;
 pub use metrics::{explained_variation, mean_duration};
 use raster::Raster;
 use temporal::TemporalSuperpixels;

@@ -97,6 +97,8 @@ struct Simplifier<'a, Q> {
     known: Vec<[u32; 3]>,
     known_bits: u32,
     report: SimplifyReport,
+    /// Vertices that have not merged into others.
+    live: usize,
     star: Vec<u32>,
     /// For the link condition.
     marks: Marks,
@@ -115,11 +117,9 @@ pub fn simplify<Q: WedgeQuadric>(
         min_shape: params.min_shape.powi(3),
         max_extent: (params.max_extent_frames as i32).saturating_mul(mesh.domain.unit()),
     };
-    let count =
-        |before: i32| mesh.vertices.iter().filter(|vertex| vertex.stamp != NONE && vertex.position.z < before).count();
     let report = SimplifyReport {
-        vertices: count(goal.before),
-        vertices_in_window: count(unfrozen.high),
+        vertices: mesh.count_before(goal.before),
+        vertices_in_window: mesh.count_before(unfrozen.high),
         ..SimplifyReport::default()
     };
     // A window that only grows is done before it begins, and ranking its edges would be all the work there is.
@@ -132,6 +132,7 @@ pub fn simplify<Q: WedgeQuadric>(
     let vertices = mesh.vertices.len();
     let mut run = Simplifier {
         alias: (0..vertices as u32).collect(),
+        live: mesh.vertex_count(),
         mesh,
         unfrozen,
         goal,
@@ -145,7 +146,6 @@ pub fn simplify<Q: WedgeQuadric>(
         star: Vec::new(),
         marks: Marks::new(if params.topology == Topology::Free { 0 } else { vertices }),
     };
-    run.rank_edges();
     run.collapse();
     let report = run.report;
     mesh.stars = Stars::default();
@@ -215,7 +215,11 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
     fn collapse(&mut self) {
         let limit = BucketQueue::bucket(self.goal.max_cost);
         let mut collapses_before = u64::MAX;
+        let mut few = usize::MAX;
         while !self.goal.is_reached(&self.report) {
+            if self.live < few {
+                few = self.improve();
+            }
             let Some((bucket, entry)) = self.queue.pop() else {
                 // What was refused may have become possible, as long as something changed since.
                 if self.aside.is_empty() || self.report.collapses == collapses_before {
@@ -235,6 +239,21 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
                 self.try_collapse(bucket, entry, proposal);
             }
         }
+    }
+
+    /// Makes room for collapses, where that is wanted, and ranks all edges anew. Returns the number of vertices below which it is
+    /// to be done again.
+    fn improve(&mut self) -> usize {
+        if self.params.improve_at > 0.0 {
+            let price = self.params.improve_cost * self.report.max_cost;
+            self.mesh.improve(self.unfrozen, &self.limits, price);
+            self.report.vertices = self.mesh.count_before(self.goal.before);
+            self.report.vertices_in_window = self.mesh.count_before(self.unfrozen.high);
+        }
+        self.queue = BucketQueue::new();
+        self.aside.clear();
+        self.rank_edges();
+        (self.params.improve_at * self.live as f32) as usize
     }
 
     /// The entry and where its collapse would lead, if its cost is current and its turn has come; an outdated one is
@@ -330,6 +349,7 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
         let keep_u = if handed_on(u) != handed_on(v) { handed_on(u) } else { larger };
         let (kept, gone) = if keep_u { (u, v) } else { (v, u) };
         self.report.collapses += 1;
+        self.live -= 1;
         self.report.max_cost = self.report.max_cost.max(proposal.cost);
         let times = [gone, kept].map(|w| self.mesh.vertices[w as usize].position.z);
         let count = |vertices: usize, end: i32| {
@@ -347,6 +367,11 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
 type Ranked = (Vec<(usize, Entry)>, u64, RefusalCounts);
 
 impl<Q: WedgeQuadric> WorkMesh<Q> {
+    /// Vertices before a time, in lattice units.
+    fn count_before(&self, time: i32) -> usize {
+        self.vertices.iter().filter(|vertex| vertex.stamp != NONE && vertex.position.z < time).count()
+    }
+
     /// Changes that the two have seen.
     fn stamp(&self, u: u32, v: u32) -> u32 {
         self.vertices[u as usize].stamp.wrapping_add(self.vertices[v as usize].stamp)

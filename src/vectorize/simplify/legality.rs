@@ -71,16 +71,16 @@ pub enum Topology {
 
 /// Volume and edges of a tet.
 #[derive(Clone, Copy)]
-struct Form {
+pub(super) struct Form {
     /// Six times its volume, in cubic lattice units.
-    volume6: i64,
+    pub(super) volume6: i64,
     /// Sum of its squared edges.
     edges: f32,
 }
 
 impl Form {
     #[inline(always)]
-    fn of([a, b, c, d]: [IVec3; 4]) -> Self {
+    pub(super) fn of([a, b, c, d]: [IVec3; 4]) -> Self {
         let (u, v, w) = ((b - a).as_vec3(), (c - a).as_vec3(), (d - a).as_vec3());
         // Squared distances between n points add up to n times their squares less the square of their sum.
         let squares = u.length_squared() + v.length_squared() + w.length_squared();
@@ -90,7 +90,7 @@ impl Form {
     /// The cube of the mean ratio, 12 (3 V)^(2/3) over the sum of squared edges: 1 for a regular tet, 0 for a flat one.
     /// Liu and Joe, "Relationship between tetrahedron shape measures", 1994.
     #[inline]
-    fn shape(self) -> f32 {
+    pub(super) fn shape(self) -> f32 {
         // (12 / edges)^3 (V6 / 2)^2
         432.0 * (self.volume6 as f32 / self.edges).powi(2) / self.edges
     }

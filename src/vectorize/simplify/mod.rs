@@ -7,12 +7,15 @@
 mod blocks;
 mod collapse;
 mod commit;
+mod improve;
 mod legality;
 mod proposal;
 mod quadric;
 mod queue;
+mod relax;
 mod stars;
 mod surfaces;
+mod swaps;
 mod work_mesh;
 
 pub use blocks::BlockGoal;
@@ -41,6 +44,11 @@ pub struct SimplifyParams {
     /// What a change costs where topology has its price ([`Topology::Priced`]): the squared jump of colour between the labels
     /// that it is about, over so many cubic pixels. Flat between 0.1 and 1 (docs/benchmarks.md).
     pub topology_price: f32,
+    /// Whenever this part of the vertices is left, tets inside of labels are improved: most collapses are refused since tets that
+    /// nothing is seen of would turn over. 0: never. Flat between 0.7 and 0.85 (docs/benchmarks.md).
+    pub improve_at: f32,
+    /// What a swap or a move that does this may cost, over the greatest cost of a collapse so far.
+    pub improve_cost: f32,
     /// Vertices that a block has which is simplified by itself; at least 1. By default its data fill a core's share of
     /// the caches.
     pub block_vertices: usize,
@@ -63,6 +71,8 @@ impl Default for SimplifyParams {
             max_extent_frames: 10,
             topology: Topology::Free,
             topology_price: 0.5,
+            improve_at: 0.0,
+            improve_cost: 0.1,
             block_vertices: 20_000,
         }
     }

@@ -60,6 +60,25 @@ impl Stars {
         }
     }
 
+    /// Puts `tet` into the star of `vertex`.
+    pub(super) fn add(&mut self, vertex: u32, tet: u32) {
+        let mut slot = self.slots[vertex as usize];
+        if slot.len == slot.capacity {
+            let start = self.pool.len() as u32;
+            self.pool.extend_from_within(slot.start as usize..(slot.start + slot.len) as usize);
+            let capacity = slot.len + slot.len / 2 + 2;
+            self.pool.resize((start + capacity) as usize, NONE);
+            slot = Slot { start, len: slot.len, capacity };
+        }
+        self.pool[(slot.start + slot.len) as usize] = tet;
+        slot.len += 1;
+        self.used += 1;
+        self.slots[vertex as usize] = slot;
+        if self.pool.len() > 2 * self.used + 1024 {
+            self.pack();
+        }
+    }
+
     /// Makes `star` the star of `kept` and empties that of `gone`.
     pub(super) fn merge(&mut self, kept: u32, gone: u32, star: &[u32]) {
         let (a, b) = (self.slots[kept as usize], self.slots[gone as usize]);
@@ -112,5 +131,9 @@ mod tests {
         assert_eq!(stars.star(2), [0, 1, 2]);
         stars.remove(2, 1);
         assert_eq!(stars.star(2), [0, 2]);
+        (3000..6000).for_each(|tet| stars.add(2, tet));
+        assert_eq!(stars.star(2).len(), 3002);
+        assert_eq!(stars.star(2)[..4], [0, 2, 3000, 3001]);
+        assert_eq!(stars.star(1), [0, 1]);
     }
 }
