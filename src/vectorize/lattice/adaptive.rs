@@ -221,10 +221,11 @@ impl Layer {
         edges.sort_unstable();
         edges.dedup();
         let cut = |edge: [u32; 2]| {
-            let crossing = labels.crossing(edge.map(|v| self.vertex(v)))?;
-            let place = crossing.before as f32 + self.share(&crossing);
+            let ends = edge.map(|v| self.vertex(v));
+            let crossing = labels.crossing(ends)?;
+            let share = self.along(ends, &crossing, self.share(&crossing));
             let colors = crossing.samples.map(|sample| self.color(sample, 0));
-            Some(EdgeCut { edge: edge.map(|v| numbers[v as usize]), share: place / crossing.steps as f32, colors })
+            Some(EdgeCut { edge: edge.map(|v| numbers[v as usize]), share, colors })
         };
         edges.into_iter().filter_map(cut).collect()
     }
@@ -234,6 +235,17 @@ impl Layer {
     fn vertex(&self, index: u32) -> [usize; 3] {
         let ([columns, lines, _], index) = (self.importance.size(), index as usize);
         [index % columns, index / columns % lines, index / (columns * lines)]
+    }
+
+    /// How far along its edge a crossing lies that is `share` of the way from its first sample to the next: lines are not
+    /// everywhere equally far apart.
+    fn along(&self, ends: [[usize; 3]; 2], crossing: &Crossing, share: f32) -> f32 {
+        let axis = (0..3).find(|&axis| ends[0][axis].abs_diff(ends[1][axis]) == crossing.steps).unwrap_or(0);
+        let lines = self.axes[axis].lines();
+        let [start, end] = ends.map(|end| end[axis]);
+        let place = |n: usize| lines[(start * (crossing.steps - n) + end * n) / crossing.steps].place as f32;
+        let [before, after] = [crossing.before, crossing.before + 1].map(place);
+        (before + share * (after - before) - place(0)) / (place(crossing.steps) - place(0))
     }
 
     /// How far from its first sample to the next a crossing lies: within a plane where the edge is, from one plane to
