@@ -110,32 +110,32 @@ impl Kernel for Painting<'_, '_> {
     fn run(mut self) {
         self.canvas.start(self.space, self.picture.view.columns as usize, self.rows.len());
         let mut pieces = [Piece::NOTHING; BATCH];
-        let mut edges = [[Edge::NOTHING; 4]; BATCH];
+        let mut outlines = [Outline::NOTHING; BATCH];
         for names in self.names.chunks(BATCH) {
             // Pieces lie far apart: fetched in one go, the waits for them overlap.
             for (piece, (list, place)) in pieces.iter_mut().zip(self.picture.named(names)) {
                 *piece = list.pieces[place];
             }
-            for ((edges, piece), (list, _)) in edges.iter_mut().zip(&pieces).zip(self.picture.named(names)) {
+            for ((outline, piece), (list, _)) in outlines.iter_mut().zip(&pieces).zip(self.picture.named(names)) {
                 if let Some(number) = piece.edges() {
-                    *edges = list.tall[number];
+                    *outline = list.tall[number];
                 }
             }
-            for (piece, edges) in pieces[..names.len()].iter().zip(&edges) {
-                self.paint(piece, edges);
+            for (piece, outline) in pieces[..names.len()].iter().zip(&outlines) {
+                self.paint(piece, outline);
             }
         }
     }
 }
 
 impl Painting<'_, '_> {
-    /// Paints what of a piece lies in the rows. `edges` count where it is tall.
+    /// Paints what of a piece lies in the rows. `outline` counts where it is tall.
     #[inline(always)]
-    fn paint(&mut self, piece: &Piece, edges: &[Edge; 4]) {
+    fn paint(&mut self, piece: &Piece, outline: &Outline) {
         match piece.shape() {
             Shape::Small => self.paint_low(piece, &piece.run.brush::<1>(self.space)),
             Shape::Low => self.paint_low(piece, &piece.run.brush::<PARTS>(self.space)),
-            Shape::Tall => self.paint_tall(piece, edges),
+            Shape::Tall => self.paint_tall(piece, outline),
         }
     }
 
@@ -150,12 +150,12 @@ impl Painting<'_, '_> {
     }
 
     #[inline(always)]
-    fn paint_tall(&mut self, piece: &Piece, edges: &[Edge; 4]) {
-        let (_, seen) = self.rows_of(piece);
+    fn paint_tall(&mut self, piece: &Piece, outline: &Outline) {
+        let (edges, (_, seen)) = (Edge::all(outline), self.rows_of(piece));
         let brush = piece.run.brush::<PARTS>(self.space);
         let mut rows = self.canvas.rows_mut();
         for row in seen.clone().step_by(TALL_ROWS) {
-            let found = spans::<TALL_ROWS>(edges, row, self.picture.view.columns);
+            let found = spans::<TALL_ROWS>(&edges, row, self.picture.view.columns);
             let count = TALL_ROWS.min((seen.end - row) as usize);
             let at = (row - self.rows.start) as usize * rows.stride;
             brush.paint(&mut rows, at, row, &found[..count]);

@@ -7,7 +7,7 @@ use glam::Vec4;
 use super::grid::turn;
 use super::parallel::List;
 use super::run::Run;
-use super::scan::{Edge, Outline, ROWS, Span};
+use super::scan::{Outline, ROWS, Span};
 
 /// A part of a slice on the surface.
 #[derive(Debug, Clone, Copy)]
@@ -107,8 +107,8 @@ pub(super) struct Pieces {
     pub(super) rows: Vec<[u16; 2]>,
     /// For anti-aliasing, one a piece.
     pub(super) patches: Vec<Patch>,
-    /// The edges of those that are tall.
-    pub(super) tall: Vec<[Edge; 4]>,
+    /// Outlines of those that are tall.
+    pub(super) tall: Vec<Outline>,
 }
 
 impl List for Pieces {

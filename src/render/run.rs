@@ -6,7 +6,8 @@
 use glam::{Vec3A, Vec4};
 use wide::{i16x8, i32x4, i32x8, u8x16};
 
-use super::canvas::{CHUNK, ColorSpace, PART, PARTS, Rows, pixel};
+use super::canvas::{CHUNK, ColorSpace, PART, PARTS, Pixel, Rows, pixel};
+use super::cpu::{self, Kernel};
 use super::scan::Span;
 
 /// Binary digits after the point of a [`Run`]. With 10 before it and a sign they fit 32 bits, in which sums may overflow:
@@ -143,14 +144,43 @@ impl<const WIDTH: usize> Brush<'_, WIDTH> {
     #[inline(never)]
     fn paint_pixels(&self, rows: &mut Rows<'_>, start: usize, count: usize, value: i32x4) {
         let [second, first, third, _] = (value - HALF).to_array();
-        let mut values = [second, first, third];
-        for place in rows.pixels[start..].iter_mut().take(count) {
-            let [g, r, b] = values.map(|v| (v >> FRACTION).clamp(0, 255));
-            *place = pixel(match self.run.way {
-                Way::Converted => self.space.of_levels([r, g, b]),
-                Way::Chunks | Way::Pixels => [r, g, b].map(|v| v as u8),
-            });
-            values = std::array::from_fn(|i| values[i].wrapping_add(self.run.right[i]));
+        let Some(pixels) = rows.pixels.get_mut(start..start + count) else { return };
+        cpu::run(Pixelwise { run: self.run, space: self.space, pixels, values: [second, first, third] });
+    }
+}
+
+/// Pixels side by side that are clamped, and converted if need be, one by one.
+struct Pixelwise<'a> {
+    run: &'a Run,
+    space: ColorSpace,
+    pixels: &'a mut [Pixel],
+    /// Channels at the first of them.
+    values: [i32; 3],
+}
+
+impl Kernel for Pixelwise<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { run: Run { right, way, .. }, space, pixels, mut values } = self;
+        for chunk in pixels.chunks_mut(CHUNK) {
+            let mut levels = [[0; CHUNK]; 3];
+            for ((levels, value), right) in levels.iter_mut().zip(&mut values).zip(right) {
+                for (i, level) in levels.iter_mut().enumerate() {
+                    *level = (value.wrapping_add(right.wrapping_mul(i as i32)) >> FRACTION).clamp(0, 255);
+                }
+                *value = value.wrapping_add(right.wrapping_mul(CHUNK as i32));
+            }
+            let mut painted = [[0; 4]; CHUNK];
+            for (i, place) in painted.iter_mut().enumerate() {
+                let rgb = [levels[1][i], levels[0][i], levels[2][i]];
+                *place = pixel(if *way == Way::Converted { space.of_levels(rgb) } else { rgb.map(|v| v as u8) });
+            }
+            match chunk.first_chunk_mut::<CHUNK>() {
+                Some(chunk) => *chunk = painted,
+                None => chunk.iter_mut().zip(painted).for_each(|(place, painted)| *place = painted),
+            }
         }
     }
 }

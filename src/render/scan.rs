@@ -56,6 +56,8 @@ fn cut(first: [f64; 2], end: [f64; 2], columns: i32, rows: Range<i32>) -> Option
 }
 
 impl Outline {
+    pub(super) const NOTHING: Self = Self { x: [0.0; 4], y: [0.0; 4] };
+
     /// Of three or four corners.
     pub(super) fn new(corners: &[GridPoint]) -> Self {
         let [x, y]: [[f64; 4]; 2] =
@@ -129,8 +131,6 @@ pub(super) struct Edge {
 }
 
 impl Edge {
-    pub(super) const NOTHING: Self = Self { x: 0.0, y: 0.0, slope: 0.0, first: 0.0 };
-
     /// From one corner to the next.
     #[inline(always)]
     pub(super) fn new([x, y]: [f64; 2], [next_x, next_y]: [f64; 2]) -> Self {

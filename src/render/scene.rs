@@ -110,7 +110,11 @@ impl Scene {
         for node in self.nodes.len()..self.complex.nodes.len() {
             self.nodes.push(self.slice_node(node));
         }
-        let span = |corners: &[u32; 4]| Span::of(corners.map(|node| self.complex.position(node)));
+        let time = |node: u32| self.nodes[node as usize].t();
+        let span = |&[a, b, c, d]: &[u32; 4]| {
+            let [a, b, c, d] = [time(a), time(b), time(c), time(d)];
+            Span::new(a.min(b).min(c.min(d)), a.max(b).max(c.max(d)))
+        };
         self.spans.extend(self.complex.tets[self.spans.len()..].iter().map(span));
     }
 
@@ -156,10 +160,12 @@ impl Scene {
             return fill_chunks(lists, tets.len(), CHUNK, |list, run| {
                 let (mut slices, mut table) = (Slices::new(), S::default());
                 for tets in tets[run].chunks(LANES) {
-                    // Nodes lie far apart: with nothing else in between, the waits for them overlap.
-                    for &tet in tets {
-                        let nodes = self.complex.tets[tet as usize].map(|node| &self.nodes[node as usize]);
-                        slices.push(tet, nodes, t, self.interfaces.faces(tet));
+                    let nodes = |tet: u32| self.complex.tets[tet as usize].map(|node| &self.nodes[node as usize]);
+                    // Nodes lie far apart: looked at in one go, the waits for them overlap.
+                    let mut above = [0; LANES];
+                    above.iter_mut().zip(tets).for_each(|(above, &tet)| *above = SliceNode::above(nodes(tet), t));
+                    for (&tet, above) in tets.iter().zip(above) {
+                        slices.push(tet, nodes(tet), above, self.interfaces.faces(tet));
                     }
                     slices.cut(t, |polygons| take(list, polygons, &mut table));
                 }
@@ -266,7 +272,8 @@ impl Parent<'_> {
         let nodes = refiner.ten(complex, self.tet).map(|node| SliceNode::new(&node, self.space));
         for child in refiner.children(self.tet) {
             let faces = child_faces(*child, self.faces);
-            slices.push(self.control, child.map(|i| &nodes[usize::from(i)]), t, faces);
+            let corners = child.map(|i| &nodes[usize::from(i)]);
+            slices.push(self.control, corners, SliceNode::above(corners, t), faces);
         }
     }
 }

@@ -100,7 +100,7 @@ impl Pieces {
             let (row, end_row) = (made.row[lane] as u16, made.end_row[lane] as u16);
             let piece = if usize::from(end_row - row) > ROWS {
                 // Looked up row by row when it is painted.
-                self.tall.push(made.edges(lane));
+                self.tall.push(outline());
                 Piece::tall(made.run(lane, way), end_row, self.tall.len() - 1)
             } else {
                 let cover = made.cover(lane);
@@ -193,11 +193,6 @@ impl Made {
         let of = |channels: &[Lanes<i32>; 3]| [channels[0][lane], channels[1][lane], channels[2][lane]];
         let origin = [self.column[lane] as u16, self.row[lane] as u16];
         Run { base: of(&self.base), right: of(&self.right), down: of(&self.down), origin, way }
-    }
-
-    #[inline(always)]
-    fn edges(&self, lane: usize) -> [Edge; 4] {
-        edges_of(&self.edges, lane)
     }
 
     #[inline(always)]
@@ -401,7 +396,10 @@ pub(super) mod tests {
             let [wide, narrow] = both_ways(|| {
                 let (mut slices, mut pieces, mut table) = (Slices::new(), Pieces::default(), Table::default());
                 for tets in tets.chunks(LANES) {
-                    tets.iter().for_each(|[a, b, c, d]| slices.push(0, [a, b, c, d], 2048, 0));
+                    for [a, b, c, d] in tets {
+                        let nodes = [a, b, c, d];
+                        slices.push(0, nodes, SliceNode::above(nodes, 2048), 0);
+                    }
                     slices.cut(2048, |polygons| pieces.push(&making, polygons, &mut table));
                 }
                 assert!(pieces.pieces.len() > 300 && pieces.tall.len() > 100, "{}", pieces.pieces.len());

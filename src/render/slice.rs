@@ -75,9 +75,17 @@ impl SliceNode {
         Self { color: space.of_rgb(rgb).to_array(), place: [x, y, z, i32::from(!space.holds(rgb))] }
     }
 
+    /// In fine units.
     #[inline(always)]
-    fn t(&self) -> i32 {
+    pub(super) fn t(&self) -> i32 {
         self.place[2]
+    }
+
+    /// Which of four corners lie above the plane at `t`, as [`above`] says.
+    #[inline(always)]
+    pub(super) fn above(nodes: [&Self; 4], t: i32) -> usize {
+        let is_above = |i: usize| usize::from(nodes[i].t() >= t) << i;
+        is_above(0) | is_above(1) | is_above(2) | is_above(3)
     }
 
     #[inline(always)]
@@ -168,12 +176,11 @@ impl Slices {
         Self { nodes: [[SliceNode::NOTHING; LANES]; 4], below: [0; LANES], polygons: Polygons::NONE }
     }
 
-    /// Adds a tet if the plane at `t` cuts it; there must be room for it. `tet` is the control tet that it belongs to.
+    /// Adds a tet if a plane cuts it, given its corners above the plane; there must be room for it. `tet` is the control tet
+    /// that it belongs to.
     #[inline(always)]
-    pub(super) fn push(&mut self, tet: u32, nodes: [&SliceNode; 4], t: i32, faces: Faces) {
-        let is_above = |i: usize| usize::from(nodes[i].t() >= t) << i;
-        let set = is_above(0) | is_above(1) | is_above(2) | is_above(3);
-        let (lane, case) = (self.polygons.count, CASES[set]);
+    pub(super) fn push(&mut self, tet: u32, nodes: [&SliceNode; 4], above: usize, faces: Faces) {
+        let (lane, case) = (self.polygons.count, CASES[above & 15]);
         if case.corners == 0 || lane >= LANES {
             return;
         }
@@ -184,7 +191,7 @@ impl Slices {
         let Polygons { tets, corners, boundaries, are_beyond, count, .. } = &mut self.polygons;
         tets[lane] = tet;
         corners[lane] = case.corners;
-        boundaries[lane] = edges_on(SLICES[set], faces);
+        boundaries[lane] = edges_on(SLICES[above & 15], faces);
         are_beyond[lane] = nodes[0].is_beyond() | nodes[1].is_beyond() | nodes[2].is_beyond() | nodes[3].is_beyond();
         *count += 1;
     }
