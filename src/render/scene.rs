@@ -4,7 +4,7 @@ use glam::IVec3;
 
 use super::active::Active;
 use super::canvas::ColorSpace;
-use super::complex::{Complex, FINE_BITS};
+use super::complex::{Complex, FINE_BITS, emptied};
 use super::interfaces::{Faces, Interfaces, child_faces};
 use super::lanes::LANES;
 use super::paint::Painters;
@@ -67,6 +67,19 @@ impl Scene {
             second: Second::default(),
             pieces: Vec::new(),
             painters: Painters::default(),
+        }
+    }
+
+    /// A scene without tets in the memory of this one, which the next slab of a stream fills as far again.
+    pub fn emptied(self, domain: Domain) -> Self {
+        Self {
+            complex: self.complex.emptied(),
+            colors: emptied(self.colors),
+            nodes: emptied(self.nodes),
+            spans: emptied(self.spans),
+            pieces: self.pieces,
+            painters: self.painters,
+            ..Self::new(domain)
         }
     }
 
