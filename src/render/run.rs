@@ -4,7 +4,7 @@
 //! covers.
 
 use glam::{Vec3A, Vec4};
-use wide::{i16x8, i32x4, i32x8, u8x16};
+use wide::{i16x8, i32x4, i32x8};
 
 use super::canvas::{CHUNK, ColorSpace, PART, PARTS, Pixel, Rows, pixel};
 use super::cpu::{self, Kernel};
@@ -61,9 +61,9 @@ impl Run {
         let pair = |first: i32x4| pack(to_chunk(first + HALF), to_chunk(first + right + HALF));
         let mut first = i32x4::ZERO;
         let lanes = [(); WIDTH].map(|()| {
-            let lanes = [pair(first), pair(first + right + right)];
+            let [low, high] = [pair(first), pair(first + right + right)].map(i16x8::to_array);
             first += right << 2;
-            lanes
+            std::array::from_fn(|i| if i < 8 { low[i] } else { high[i - 8] })
         });
         Brush { run: self, space, right, lanes }
     }
@@ -85,8 +85,8 @@ pub(super) struct Brush<'a, const WIDTH: usize> {
     space: ColorSpace,
     /// The step to the next pixel.
     right: i32x4,
-    /// The steps from a chunk's first pixel to each, two pixels to a register.
-    lanes: [[i16x8; 2]; WIDTH],
+    /// The steps from a chunk's first pixel to each.
+    lanes: [[i16; 4 * PART]; WIDTH],
 }
 
 impl<const WIDTH: usize> Brush<'_, WIDTH> {
@@ -106,7 +106,8 @@ impl<const WIDTH: usize> Brush<'_, WIDTH> {
                 if *way == Way::Chunks {
                     self.paint_chunks(rows, start, count, first);
                 } else {
-                    self.paint_pixels(rows, start, count, first);
+                    let [second, first, third, _] = (first - HALF).to_array();
+                    self.paint_pixels(rows, start, count, [second, first, third]);
                 }
             }
             value += down;
@@ -118,34 +119,39 @@ impl<const WIDTH: usize> Brush<'_, WIDTH> {
     fn paint_chunks(&self, rows: &mut Rows<'_>, mut start: usize, mut left: usize, mut value: i32x4) {
         while left > WIDTH * PART {
             let Some(chunk) = rows.chunk_mut::<WIDTH>(start) else { return };
-            chunk.iter_mut().zip(self.painted(value)).for_each(|(bytes, painted)| *bytes = painted.to_array());
+            chunk.iter_mut().zip(self.painted(value)).for_each(|(bytes, painted)| *bytes = painted);
             value += self.right * i32x4::splat((WIDTH * PART) as i32);
             start += WIDTH * PART;
             left -= WIDTH * PART;
         }
         let Some(chunk) = rows.chunk_mut::<WIDTH>(start) else { return };
         for ((bytes, painted), mask) in chunk.iter_mut().zip(self.painted(value)).zip(MASKS[left & MOST]) {
-            let mask = u8x16::new(mask);
-            *bytes = ((painted & mask) | (u8x16::new(*bytes) & !mask)).to_array();
+            for ((byte, painted), mask) in bytes.iter_mut().zip(painted).zip(mask) {
+                *byte = painted & mask | *byte & !mask;
+            }
         }
     }
 
     /// The pixels of a chunk, given the value at the first.
     #[inline(always)]
-    fn painted(&self, value: i32x4) -> [u8x16; WIDTH] {
+    fn painted(&self, value: i32x4) -> [[u8; 4 * PART]; WIDTH] {
         let start = to_chunk(value);
-        let start = pack(start, start);
-        // Saturates to [0, 255].
-        self.lanes.map(|[first, second]| {
-            u8x16::narrow_i16x8((start + first) >> CHUNK_FRACTION as i32, (start + second) >> CHUNK_FRACTION as i32)
-        })
+        // Plain lists: they become registers as wide as there are, which types of a fixed width do not.
+        let [a, b, c, d, ..] = pack(start, start).to_array();
+        let start = [a, b, c, d, a, b, c, d, a, b, c, d, a, b, c, d];
+        let mut painted = [[0; 4 * PART]; WIDTH];
+        for (painted, lanes) in painted.iter_mut().zip(&self.lanes) {
+            for ((byte, start), step) in painted.iter_mut().zip(start).zip(lanes) {
+                *byte = (start.wrapping_add(*step) >> CHUNK_FRACTION).clamp(0, 255) as u8;
+            }
+        }
+        painted
     }
 
     #[inline(never)]
-    fn paint_pixels(&self, rows: &mut Rows<'_>, start: usize, count: usize, value: i32x4) {
-        let [second, first, third, _] = (value - HALF).to_array();
+    fn paint_pixels(&self, rows: &mut Rows<'_>, start: usize, count: usize, values: [i32; 3]) {
         let Some(pixels) = rows.pixels.get_mut(start..start + count) else { return };
-        cpu::run(Pixelwise { run: self.run, space: self.space, pixels, values: [second, first, third] });
+        cpu::run(Pixelwise { run: self.run, space: self.space, pixels, values });
     }
 }
 
