@@ -22,6 +22,7 @@ mod interfaces;
 mod lanes;
 mod level;
 mod masks;
+mod measure;
 mod pack;
 mod paint;
 mod parallel;

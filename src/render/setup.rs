@@ -4,16 +4,15 @@
 //! every pixel once, counted with sign, as the box stays in place under subdivision; so each pixel has a polygon that was
 //! not turned over, and the last of them is shown.
 //!
-//! Most polygons cover a few pixels, so this is most of the work where pictures are small: nothing branches on what a polygon
-//! looks like until all is known of it, and a quarter of them turns out to cover nothing.
-#![expect(clippy::needless_range_loop, reason = "many lists are walked side by side, lane by lane")]
+//! Most polygons cover a few pixels, so this is most of the work where pictures are small: all is found out of all of them
+//! at once ([`Measures`]), though a quarter turns out to cover nothing.
 
-use super::canvas::{ColorSpace, PART};
-use super::cpu::{self, Kernel};
-use super::lanes::{LANES, Lanes, ceil, least, most, whole};
+use super::canvas::ColorSpace;
+use super::lanes::LANES;
+use super::measure::{Colors, Measures, Places, place};
 use super::piece::{Patch, Piece, Pieces};
-use super::run::{FRACTION, Run, Way, clamped};
-use super::scan::{Edge, Outline, ROWS, Span, Turning, span};
+use super::run::{Way, clamped};
+use super::scan::{Outline, ROWS, Span, Turning};
 use super::slice::Polygons;
 use super::view::View;
 
@@ -25,49 +24,23 @@ pub(super) struct Making<'a> {
     pub(super) antialias: bool,
 }
 
-/// x and y of corners in pixels, on the grid; a triangle's last one stands twice.
-type Places = [[Lanes<f64>; 2]; 4];
-
-/// Colours at corners.
-type Colors = [[Lanes<f32>; 3]; 4];
-
 /// What is worked with; its memory is used again.
+#[derive(Default)]
 pub(super) struct Table {
     places: Places,
-    made: Made,
-}
-
-impl Default for Table {
-    fn default() -> Self {
-        let numbers = [0; LANES];
-        let made = Made {
-            column: numbers,
-            row: numbers,
-            end_row: numbers,
-            is_seen: [false; LANES],
-            is_narrow: [false; LANES],
-            extent: [0.0; LANES],
-            is_convex: [false; LANES],
-            edges: [[[0.0; LANES]; 4]; 4],
-            cover: [[Span::EMPTY; LANES]; ROWS],
-            base: [[0; LANES]; 3],
-            right: [[0; LANES]; 3],
-            down: [[0; LANES]; 3],
-        };
-        Self { places: [[[0.0; LANES]; 2]; 4], made }
-    }
+    measures: Measures,
 }
 
 impl Pieces {
     /// Appends what of polygons is seen.
     pub(super) fn push(&mut self, making: &Making<'_>, polygons: &Polygons, table: &mut Table) {
-        let Table { places, made } = table;
-        cpu::run(Placing { view: making.view, polygons, places });
-        self.push_placed(making, polygons, places, made);
+        let Table { places, measures } = table;
+        place(making.view, polygons, places);
+        self.push_placed(making, polygons, places, measures);
     }
 
     /// Appends what is seen of polygons at these places.
-    fn push_placed(&mut self, making: &Making<'_>, polygons: &Polygons, places: &Places, made: &mut Made) {
+    fn push_placed(&mut self, making: &Making<'_>, polygons: &Polygons, places: &Places, measures: &mut Measures) {
         let (mut clamped_colors, mut ways) = (None, [Way::Chunks; LANES]);
         for lane in (0..polygons.count).filter(|&lane| polygons.are_beyond[lane]) {
             let (way, colors) = clamped(&polygons.colors(lane), making.space);
@@ -78,14 +51,14 @@ impl Pieces {
             }
         }
         let colors = clamped_colors.as_ref().unwrap_or(&polygons.colors);
-        cpu::run(SettingUp { making, places, colors, made });
+        measures.find(making.view, making.antialias, places, colors);
         for (lane, &way) in ways[..polygons.count].iter().enumerate() {
-            if !made.is_seen[lane] {
+            if !measures.is_seen[lane] {
                 continue;
             }
             let outline = || outline(places, lane);
             let is_convex =
-                if made.extent[lane] < Turning::SMALL { made.is_convex[lane] } else { outline().is_convex() };
+                if measures.extent[lane] < Turning::SMALL { measures.is_convex[lane] } else { outline().is_convex() };
             let patch = || Patch {
                 outline: outline(),
                 colors: polygons.colors(lane),
@@ -97,17 +70,17 @@ impl Pieces {
                 self.push_halves(making, &patch());
                 continue;
             }
-            let (row, end_row) = (made.row[lane] as u16, made.end_row[lane] as u16);
+            let (row, end_row) = (measures.row[lane] as u16, measures.end_row[lane] as u16);
             let piece = if usize::from(end_row - row) > ROWS {
                 // Looked up row by row when it is painted.
                 self.tall.push(outline());
-                Piece::tall(made.run(lane, way), end_row, self.tall.len() - 1)
+                Piece::tall(measures.run(lane, way), end_row, self.tall.len() - 1)
             } else {
-                let cover = made.cover(lane);
+                let cover = measures.cover(lane);
                 if !making.antialias && Span::are_empty(&cover) {
                     continue;
                 }
-                Piece::low(made.run(lane, way), end_row, made.is_narrow[lane], cover)
+                Piece::low(measures.run(lane, way), end_row, measures.is_narrow[lane], cover)
             };
             self.rows.push([row, end_row]);
             self.pieces.push(piece);
@@ -119,10 +92,10 @@ impl Pieces {
 
     #[cold]
     fn push_halves(&mut self, making: &Making<'_>, patch: &Patch) {
-        let (Table { mut places, mut made }, mut halves) = (Table::default(), Polygons::NONE);
+        let (Table { mut places, mut measures }, mut halves) = (Table::default(), Polygons::NONE);
         for (lane, half) in patch.halves().enumerate() {
-            for corner in 0..4 {
-                (places[corner][0][lane], places[corner][1][lane]) = (half.outline.x[corner], half.outline.y[corner]);
+            for (corner, place) in places.iter_mut().enumerate() {
+                (place[0][lane], place[1][lane]) = (half.outline.x[corner], half.outline.y[corner]);
                 let color = half.colors[corner].to_array();
                 halves.colors[corner].iter_mut().zip(color).for_each(|(channel, level)| channel[lane] = level);
             }
@@ -131,7 +104,7 @@ impl Pieces {
             halves.count = lane + 1;
         }
         if halves.count > 0 {
-            self.push_placed(making, &halves, &places, &mut made);
+            self.push_placed(making, &halves, &places, &mut measures);
         }
     }
 }
@@ -141,209 +114,13 @@ fn outline(places: &Places, lane: usize) -> Outline {
     Outline { x: axis(0), y: axis(1) }
 }
 
-/// From fine units to pixels.
-struct Placing<'a> {
-    view: &'a View,
-    polygons: &'a Polygons,
-    places: &'a mut Places,
-}
-
-impl Kernel for Placing<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        for (places, fine) in self.places.iter_mut().zip(&self.polygons.places) {
-            for axis in 0..2 {
-                for i in 0..LANES {
-                    places[axis][i] = self.view.px(axis, fine[axis][i]);
-                }
-            }
-        }
-    }
-}
-
-/// What is found out of polygons.
-struct Made {
-    /// The first column and row, and the row beyond the last, cut to the surface.
-    column: Lanes<u32>,
-    row: Lanes<u32>,
-    end_row: Lanes<u32>,
-    /// Whether there are any.
-    is_seen: Lanes<bool>,
-    /// Whether there are no more than [`PART`] columns.
-    is_narrow: Lanes<bool>,
-    /// The larger side, in pixels.
-    extent: Lanes<f64>,
-    /// As of [`Turning`].
-    is_convex: Lanes<bool>,
-    /// Corner by corner the edge to the next: what an [`Edge`] is made of.
-    edges: [[Lanes<f64>; 4]; 4],
-    /// Spans of the first rows.
-    cover: [Lanes<Span>; ROWS],
-    /// As of [`Run`].
-    base: [Lanes<i32>; 3],
-    right: [Lanes<i32>; 3],
-    down: [Lanes<i32>; 3],
-}
-
-impl Made {
-    #[inline(always)]
-    fn run(&self, lane: usize, way: Way) -> Run {
-        let of = |channels: &[Lanes<i32>; 3]| [channels[0][lane], channels[1][lane], channels[2][lane]];
-        let origin = [self.column[lane] as u16, self.row[lane] as u16];
-        Run { base: of(&self.base), right: of(&self.right), down: of(&self.down), origin, way }
-    }
-
-    #[inline(always)]
-    fn cover(&self, lane: usize) -> [Span; ROWS] {
-        [0, 1, 2, 3].map(|row| self.cover[row][lane])
-    }
-}
-
-/// From places and colours to all that pieces are made of.
-struct SettingUp<'a> {
-    making: &'a Making<'a>,
-    places: &'a Places,
-    colors: &'a Colors,
-    made: &'a mut Made,
-}
-
-impl Kernel for SettingUp<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(mut self) {
-        self.find_rows();
-        self.find_spans();
-        self.find_colors();
-    }
-}
-
-impl SettingUp<'_> {
-    #[inline(always)]
-    fn corners(&self, axis: usize, lane: usize) -> [f64; 4] {
-        [0, 1, 2, 3].map(|corner| self.places[corner][axis][lane])
-    }
-
-    #[inline(always)]
-    fn find_rows(&mut self) {
-        let Making { view, antialias, .. } = *self.making;
-        for i in 0..LANES {
-            let (first_column, end_column, width) = extent(self.corners(0, i), view.columns, antialias);
-            let (first_row, end_row, height) = extent(self.corners(1, i), view.rows, antialias);
-            self.made.column[i] = whole(first_column);
-            self.made.row[i] = whole(first_row);
-            self.made.end_row[i] = whole(end_row);
-            self.made.is_seen[i] = (first_column < end_column) & (first_row < end_row);
-            self.made.is_narrow[i] = end_column - first_column <= PART as f64;
-            self.made.extent[i] = most(width, height);
-        }
-    }
-
-    #[inline(always)]
-    fn find_spans(&mut self) {
-        let width = f64::from(self.making.view.columns);
-        let edges = &mut self.made.edges;
-        for corner in 0..4 {
-            let (from, to) = (&self.places[corner], &self.places[(corner + 1) % 4]);
-            for i in 0..LANES {
-                let Edge { x, y, slope, first } = Edge::new([from[0][i], from[1][i]], [to[0][i], to[1][i]]);
-                edges[corner][0][i] = x;
-                edges[corner][1][i] = y;
-                edges[corner][2][i] = slope;
-                edges[corner][3][i] = first;
-            }
-        }
-        for (row, spans) in self.made.cover.iter_mut().enumerate() {
-            for i in 0..LANES {
-                let row = f64::from(self.made.row[i] as i32) + row as f64;
-                spans[i] = span(&edges_of(edges, i), row, width);
-            }
-        }
-    }
-
-    /// The linear field that takes the colours at the corners. It follows from the diagonals; a triangle's second one is a
-    /// side.
-    #[inline(always)]
-    fn find_colors(&mut self) {
-        // Beyond this, rounding of the gradient shows: a sliver that is thinner than any pixel's digits has one colour.
-        const STEEPEST: f64 = (1u64 << 30) as f64;
-        let mut scaled = [[0.0; LANES]; 4];
-        for i in 0..LANES {
-            let Turning { diagonals: [u, v], double_area, is_convex } =
-                Turning::new(self.corners(0, i), self.corners(1, i));
-            self.made.is_convex[i] = is_convex;
-            let scale = 1.0 / double_area;
-            (scaled[0][i], scaled[1][i]) = (u[0] * scale, u[1] * scale);
-            (scaled[2][i], scaled[3][i]) = (v[0] * scale, v[1] * scale);
-        }
-        let mut gradients = [[[0.0; LANES]; 2]; 3];
-        let mut are_flat = [u64::MAX; LANES];
-        for (channel, [right, down]) in gradients.iter_mut().enumerate() {
-            let [a, b, c, d] = [0, 1, 2, 3].map(|corner| &self.colors[corner][channel]);
-            for i in 0..LANES {
-                let (along_u, along_v) = (f64::from(c[i] - a[i]), f64::from(d[i] - b[i]));
-                right[i] = along_u * scaled[3][i] - along_v * scaled[1][i];
-                down[i] = along_v * scaled[0][i] - along_u * scaled[2][i];
-                let extent = most(self.made.extent[i], 1.0);
-                let is_flat = ((right[i] * extent).abs() < STEEPEST) & ((down[i] * extent).abs() < STEEPEST);
-                are_flat[i] &= if is_flat { u64::MAX } else { 0 };
-            }
-        }
-        let mut origin = [[0.0; LANES]; 2];
-        for i in 0..LANES {
-            origin[0][i] = f64::from(self.made.column[i] as i32) + 0.5 - self.places[0][0][i];
-            origin[1][i] = f64::from(self.made.row[i] as i32) + 0.5 - self.places[0][1][i];
-        }
-        for (channel, [right, down]) in gradients.iter().enumerate() {
-            let color = &self.colors[0][channel];
-            for i in 0..LANES {
-                let [right, down] = [right[i], down[i]].map(|change| f64::from_bits(change.to_bits() & are_flat[i]));
-                self.made.base[channel][i] =
-                    fixed(f64::from(color[i]) + right * origin[0][i] + down * origin[1][i] + 0.5);
-                self.made.right[channel][i] = fixed(right);
-                self.made.down[channel][i] = fixed(down);
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn edges_of(edges: &[[Lanes<f64>; 4]; 4], lane: usize) -> [Edge; 4] {
-    [0, 1, 2, 3].map(|corner| {
-        let [x, y, slope, first] = &edges[corner];
-        Edge { x: x[lane], y: y[lane], slope: slope[lane], first: first[lane] }
-    })
-}
-
-/// The first row or column, the one beyond the last, cut to a surface of this size, and the length in pixels.
-#[inline(always)]
-fn extent([a, b, c, d]: [f64; 4], size: i32, antialias: bool) -> (f64, f64, f64) {
-    let low = least(least(a, b), least(c, d));
-    let high = most(most(a, b), most(c, d));
-    // For anti-aliasing all pixels that are touched, else those whose centres are covered.
-    let first = if antialias { -ceil(-low) } else { ceil(low - 0.5) };
-    let end = if antialias { ceil(high) } else { ceil(high - 0.5) };
-    let cut = |v: f64| least(most(v, 0.0), size.into());
-    (cut(first), cut(end), high - low)
-}
-
-/// Rounds to [`FRACTION`] digits; what is beyond 32 bits of that is cut off above. Values are below 2^31.
-#[inline(always)]
-fn fixed(v: f64) -> i32 {
-    // Added to 1.5 * 2^52, a number's last digits are those of the integer: cheaper than a checked cast.
-    const ROUND: f64 = (3u64 << 51) as f64;
-    const SCALE: f64 = (1u64 << FRACTION) as f64;
-    (v * SCALE + ROUND).to_bits() as i32
-}
-
 #[cfg(test)]
 pub(super) mod tests {
     use glam::Vec4;
 
     use super::super::cpu::tests::both_ways;
     use super::super::refiner::{COLOR_BITS, FineNode};
+    use super::super::run::Run;
     use super::super::slice::{SliceNode, Slices};
     use super::super::view::Viewport;
     use super::*;
@@ -359,14 +136,14 @@ pub(super) mod tests {
         let view = View::new(&domain, Viewport::whole(&domain), (8192, 8192));
         let making = Making { view: &view, space, antialias: false };
         let (mut pieces, mut polygons) = (Pieces::default(), Polygons::NONE);
-        let Table { mut places, mut made } = Table::default();
+        let Table { mut places, mut measures } = Table::default();
         for corner in 0..4 {
             (places[corner][0][0], places[corner][1][0]) = (outline.x[corner], outline.y[corner]);
             let color = colors[corner].to_array();
             polygons.colors[corner].iter_mut().zip(color).for_each(|(channel, level)| channel[0] = level);
         }
         (polygons.count, polygons.corners[0], polygons.are_beyond[0]) = (1, 3, is_beyond);
-        pieces.push_placed(&making, &polygons, &places, &mut made);
+        pieces.push_placed(&making, &polygons, &places, &mut measures);
         pieces.pieces[0].run
     }
 
