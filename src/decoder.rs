@@ -166,10 +166,8 @@ impl Decoder {
         match brought {
             Some(Brought::Growth(growth)) => {
                 self.flushed = None;
-                if growth.is_whole {
-                    self.slab = None;
-                }
-                let slab = || Slab::new(growth.header, growth.first_frame, growth.tail.domain);
+                let over = self.slab.take_if(|_| growth.is_whole);
+                let slab = || Slab::new(growth.header, growth.first_frame, growth.tail.domain, over);
                 self.slab.get_or_insert_with(slab).grow(growth);
             }
             Some(Brought::Again(progress)) => {
@@ -213,36 +211,6 @@ impl Decoder {
         slab.draw(&at, surface)
     }
 
-    /// [`Self::render_with`], and at the same time, on another thread where there is one, [`Self::send_packet`] with the
-    /// packet that comes next: the picture is one of before it.
-    ///
-    /// Returns what both would have returned.
-    pub fn render_and_send(
-        &mut self,
-        params: &RenderParams,
-        surface: &mut Surface<'_>,
-        data: &[u8],
-    ) -> (Result<(), DecodeError>, Result<PacketInfo, DecodeError>) {
-        self.take_queued();
-        let parse = || self.ahead.parse_now(data);
-        let (drawn, parsed) = match &mut self.slab {
-            None => (Err(DecodeError::NoKeyframe), parse()),
-            Some(slab) => {
-                let at = slab.prepare(&self.config, params);
-                let draw = || slab.draw(&at, surface);
-                #[cfg(feature = "threads")]
-                let both = match &self.pool {
-                    Some(pool) => pool.install(|| rayon::join(draw, parse)),
-                    None => rayon::join(draw, parse),
-                };
-                #[cfg(not(feature = "threads"))]
-                let both = one_by_one(draw, parse);
-                both
-            }
-        };
-        (drawn, self.take(parsed))
-    }
-
     /// Forgets what can be drawn and packets that are queued, and waits for a keyframe, and for a packet that is being
     /// decoded. If the keyframe is the one before the flush again, it and the packets behind it that were decoded before
     /// cost nothing: a seek back costs as much as drawing.
@@ -254,11 +222,6 @@ impl Decoder {
         self.header = None;
         self.flushed = self.slab.take().or(self.flushed.take());
     }
-}
-
-#[cfg(not(feature = "threads"))]
-fn one_by_one<A, B>(first: impl FnOnce() -> A, second: impl FnOnce() -> B) -> (A, B) {
-    (first(), second())
 }
 
 /// A pool of so many threads; with 0, or where none can be made, the global one, which has a thread a core.

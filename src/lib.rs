@@ -12,7 +12,7 @@
 #![cfg_attr(not(feature = "encode"), doc = "```ignore")]
 #![doc = include_str!("../examples/ten_lines.rs")]
 //! ```
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 pub mod bitstream;
 pub mod decoder;

@@ -10,8 +10,8 @@ use tetvec::bitstream::{Fraction, SequenceHeader, SlabWriter};
 use tetvec::mesh::{Domain, TetMesh};
 use tetvec::render::DrawParams;
 use tetvec::{
-    DecodeError, Decoder, DecoderConfig, Packet, PacketInfo, PixelFormat, Plane, RenderParams,
-    SequenceHeader as Header, Surface, Viewport, YuvMatrix,
+    DecodeError, Decoder, DecoderConfig, Packet, PacketInfo, PixelFormat, Plane, SequenceHeader as Header, Surface,
+    Viewport, YuvMatrix,
 };
 
 const SIZE: (u32, u32) = (97, 71);
@@ -80,13 +80,11 @@ fn drawing_and_decoding_at_once_is_one_after_the_other() {
         decoder.send_packet(&packets[0].data).expect("a keyframe");
     }
     for (k, next) in packets.iter().enumerate().skip(1) {
-        let params = RenderParams { frame: k as f64 - 1.0, ..RenderParams::default() };
-        let mut data = vec![0; 3 * (SIZE.0 * SIZE.1) as usize];
-        let planes = vec![Plane { data: &mut data, stride: 3 * SIZE.0 as usize }];
-        let mut surface = Surface::try_new(PixelFormat::Rgb, YuvMatrix::Bt601, SIZE, planes).expect("a surface");
-        let (drawn, sent) = both.render_and_send(&params, &mut surface, &next.data);
-        assert_eq!(drawn, Ok(()));
-        assert_eq!(picture(&mut turns, params.frame), Ok(data), "frame {k}");
+        both.queue_packet(next.data.clone());
+        let drawn = picture(&mut both, k as f64 - 1.0);
+        assert!(drawn.is_ok(), "frame {k}");
+        assert_eq!(picture(&mut turns, k as f64 - 1.0), drawn, "frame {k}");
+        let sent = both.receive_packet().expect("a packet is queued");
         assert_eq!(turns.send_packet(&next.data), sent, "packet {k}");
         assert_eq!(sent.is_ok(), k < damaged, "packet {k}");
     }

@@ -32,9 +32,10 @@ pub(super) struct DrawingAt {
 }
 
 impl Slab {
-    /// A slab of which nothing has come.
-    pub(super) fn new(header: SequenceHeader, first_frame: u64, domain: Domain) -> Self {
-        Self { scene: Scene::new(domain), behind: Vec::new(), header, first_frame, last_frame: 0.0 }
+    /// A slab of which nothing has come, in the memory of one that is over.
+    pub(super) fn new(header: SequenceHeader, first_frame: u64, domain: Domain, over: Option<Self>) -> Self {
+        let scene = over.map_or_else(|| Scene::new(domain), |slab| slab.scene.emptied(domain));
+        Self { scene, behind: Vec::new(), header, first_frame, last_frame: 0.0 }
     }
 
     /// Takes in what a packet brought.

@@ -8,8 +8,14 @@ use glam::{Vec3A, Vec4};
 
 use crate::video::{PixelFormat, YuvMatrix, rgb_to_yuv};
 
-/// Pixels that are written at a time. Rows have as much room beyond their end.
-pub(super) const CHUNK: usize = 4;
+/// Pixels that are written at a time, at most. Rows have as much room beyond their end.
+pub(super) const CHUNK: usize = PARTS * PART;
+
+/// Parts of a chunk.
+pub(super) const PARTS: usize = 2;
+
+/// Pixels of a register of the smallest size.
+pub(super) const PART: usize = 4;
 
 /// The second channel, the first, the third, and a byte of no meaning: so both kinds of chroma have room for sums.
 pub(super) type Pixel = [u8; 4];
@@ -90,6 +96,23 @@ impl ColorSpace {
     }
 }
 
+/// The rows of a canvas, as they lie in memory.
+#[derive(Debug)]
+pub(super) struct Rows<'a> {
+    pub(super) pixels: &'a mut [Pixel],
+    /// Pixels from a row to the next.
+    pub(super) stride: usize,
+}
+
+impl Rows<'_> {
+    /// The bytes of so many parts of a chunk from the pixel `start` on.
+    #[inline(always)]
+    pub(super) fn chunk_mut<const WIDTH: usize>(&mut self, start: usize) -> Option<&mut [[u8; 4 * PART]; WIDTH]> {
+        let pixels = self.pixels.get_mut(start..start + WIDTH * PART)?;
+        pixels.as_flattened_mut().as_chunks_mut().0.first_chunk_mut()
+    }
+}
+
 /// The pixels of some rows.
 #[derive(Debug)]
 pub(super) struct Canvas {
@@ -106,14 +129,15 @@ impl Canvas {
     }
 
     /// Starts anew, all black.
+    #[inline(always)]
     pub(super) fn start(&mut self, space: ColorSpace, width: usize, rows: usize) {
         (self.space, self.width) = (space, width);
         let black = match space {
             ColorSpace::Rgb => pixel([0; 3]),
             ColorSpace::Yuv(_) => pixel([16, 128, 128]),
         };
-        self.pixels.clear();
         self.pixels.resize((width + CHUNK) * rows, black);
+        self.pixels.fill(black);
     }
 
     /// The pixels of a row, and [`CHUNK`] more.
@@ -123,17 +147,10 @@ impl Canvas {
         &mut self.pixels[stride * row..][..stride]
     }
 
-    /// The pixels of each row from `row` on, and [`CHUNK`] more of each.
+    /// All rows.
     #[inline]
-    pub(super) fn rows_mut(&mut self, row: usize) -> impl Iterator<Item = &mut [Pixel]> {
-        let stride = self.width + CHUNK;
-        self.pixels[stride * row..].chunks_exact_mut(stride)
-    }
-
-    /// Pixels of a row.
-    #[inline]
-    pub(super) fn width(&self) -> usize {
-        self.width
+    pub(super) fn rows_mut(&mut self) -> Rows<'_> {
+        Rows { pixels: &mut self.pixels, stride: self.width + CHUNK }
     }
 
     /// The pixels of a row.

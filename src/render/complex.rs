@@ -47,6 +47,18 @@ impl Complex {
         complex
     }
 
+    /// Nothing, in the memory of this one.
+    pub(super) fn emptied(self) -> Self {
+        Self {
+            points: emptied(self.points),
+            pinned: emptied(self.pinned),
+            sides: emptied(self.sides),
+            nodes: emptied(self.nodes),
+            tets: emptied(self.tets),
+            top: None,
+        }
+    }
+
     /// Takes in what `mesh` gained at the ends of its arrays since the last call, and the present state of pins.
     /// Returns the points that changed sides.
     pub(super) fn extend(&mut self, mesh: &TetMesh) -> Vec<u32> {
@@ -96,6 +108,12 @@ impl Complex {
     pub(super) fn sides(&self, node: u32) -> Sides {
         self.sides[self.point(node) as usize]
     }
+}
+
+/// A list without items in the memory of this one.
+pub(super) fn emptied<T>(mut list: Vec<T>) -> Vec<T> {
+    list.clear();
+    list
 }
 
 /// Tets around each point, in a form that grows with the mesh: a list through the corners of tets, ascending.

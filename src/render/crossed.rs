@@ -108,7 +108,9 @@ impl Crossed {
         if self.sums.is_empty() {
             return;
         }
-        let Some((columns, rows)) = outline.hull().touched(self.columns.len() as i32, &self.rows) else { return };
+        let Some((columns, rows)) = outline.hull().touched(self.columns.len() as i32, self.rows.clone()) else {
+            return;
+        };
         let from_first = Rows::MAX << (rows.start - self.rows.start);
         let within = from_first & Rows::MAX >> (self.rows.start + Rows::BITS as i32 - rows.end);
         let tiles = columns.start as usize / TILE..=(columns.end as usize - 1) / TILE;

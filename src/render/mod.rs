@@ -1,7 +1,7 @@
 //! From a slab's control mesh to pixels: subdivide, slice at a time, fill, pack into the pixel format.
 //!
 //! ```text
-//! complex -> rings -> level | refiner -> slice -> scan, run -> canvas -> crossed -> pack
+//! complex -> rings -> level | refiner -> slice -> setup -> scan, run -> canvas -> crossed -> pack
 //! ```
 //!
 //! In: a mesh, a time, a size. Out: pixels; for the fit also masks ([`color_masks`], [`position_masks`]) and where
@@ -14,15 +14,19 @@ mod canvas;
 mod children;
 mod complex;
 mod coverage;
+mod cpu;
 mod crossed;
 mod draw;
 mod grid;
 mod interfaces;
+mod lanes;
 mod level;
 mod masks;
+mod measure;
 mod pack;
 mod paint;
 mod parallel;
+mod piece;
 mod refiner;
 mod rings;
 mod run;
@@ -31,6 +35,7 @@ mod scan;
 mod scene;
 mod second;
 mod section;
+mod setup;
 mod shade;
 mod slice;
 mod subdivide;

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::canvas::{Canvas, ColorSpace, Pixel, channels};
+use super::cpu::{self, Kernel};
 use crate::video::{PixelFormat, Surface};
 
 /// Rows that are painted together: at 3840 pixels a row 490 kB, which stay in the second-level cache. Even,
@@ -58,18 +59,11 @@ impl Band<'_> {
 
     /// Writes the band's rows. Unused bytes of 4-byte formats become 255. `chroma` is memory for a row of it.
     pub(super) fn pack(&mut self, canvas: &Canvas, chroma: &mut Vec<[u8; 2]>) {
-        match self.format {
-            PixelFormat::Rgb => self.pack_rows(canvas, channels),
-            PixelFormat::Rgbx => self.pack_rows(canvas, |[g, r, b, _]| [r, g, b, 255]),
-            PixelFormat::Bgrx => self.pack_rows(canvas, |[g, r, b, _]| [b, g, r, 255]),
-            PixelFormat::I420 | PixelFormat::Nv12 => {
-                self.pack_rows(canvas, |pixel| [(u32::from_le_bytes(pixel) >> 8) as u8]);
-                self.pack_chroma(canvas, chroma);
-            }
-        }
+        cpu::run(Packing { band: self, canvas, chroma });
     }
 
     /// Writes the first plane.
+    #[inline(always)]
     fn pack_rows<const N: usize>(&mut self, canvas: &Canvas, layout: impl Fn(Pixel) -> [u8; N]) {
         let (bytes, stride) = &mut self.planes[0];
         for (row, bytes) in bytes.chunks_mut(*stride).enumerate() {
@@ -82,6 +76,7 @@ impl Band<'_> {
 
     /// Writes U and V: at even columns, halfway between two rows, as MPEG-2 and its heirs site them. So a sample is
     /// the mean of two rows and of columns weighted 1, 2, 1.
+    #[inline(always)]
     fn pack_chroma(&mut self, canvas: &Canvas, row: &mut Vec<[u8; 2]>) {
         let (rows, samples) = (self.rows.len(), self.width.div_ceil(2));
         // An odd last row stands for both.
@@ -106,6 +101,31 @@ impl Band<'_> {
     }
 }
 
+/// See [`Band::pack`].
+struct Packing<'a, 'b> {
+    band: &'a mut Band<'b>,
+    canvas: &'a Canvas,
+    chroma: &'a mut Vec<[u8; 2]>,
+}
+
+impl Kernel for Packing<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { band, canvas, chroma } = self;
+        match band.format {
+            PixelFormat::Rgb => band.pack_rows(canvas, channels),
+            PixelFormat::Rgbx => band.pack_rows(canvas, |[g, r, b, _]| [r, g, b, 255]),
+            PixelFormat::Bgrx => band.pack_rows(canvas, |[g, r, b, _]| [b, g, r, 255]),
+            PixelFormat::I420 | PixelFormat::Nv12 => {
+                band.pack_rows(canvas, |pixel| [(u32::from_le_bytes(pixel) >> 8) as u8]);
+                band.pack_chroma(canvas, chroma);
+            }
+        }
+    }
+}
+
 /// Both kinds of chroma of a pixel, each in a half of its own with room for sums.
 #[inline]
 fn chroma(pixel: Pixel) -> u32 {
@@ -113,7 +133,7 @@ fn chroma(pixel: Pixel) -> u32 {
 }
 
 /// Makes one row of chroma of half the width from two rows of pixels, sample by sample.
-#[inline]
+#[inline(always)]
 fn halve(rows: [&[Pixel]; 2], places: &mut [[u8; 2]]) {
     let width = rows[0].len();
     let mean = |sum: u32| {

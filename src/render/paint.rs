@@ -6,12 +6,14 @@
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-use super::canvas::{Canvas, ColorSpace};
+use super::canvas::{Canvas, ColorSpace, PARTS};
+use super::cpu::{self, Kernel};
 use super::crossed::Crossed;
-use super::draw::{Piece, Pieces};
 use super::pack::{BAND_ROWS, Band, bands};
 use super::parallel::for_each;
-use super::scan::{Edges, Outline, ROWS};
+use super::piece::{Piece, Pieces, Shape};
+use super::run::Brush;
+use super::scan::{Edge, Outline, spans};
 use super::scene::CHUNK;
 use super::view::View;
 use crate::video::Surface;
@@ -72,23 +74,7 @@ impl Painter {
     fn paint<'a>(&mut self, picture: &Picture<'a>, names: &'a [u32], band: &mut Band<'_>) {
         let Self { canvas, crossed, chroma } = self;
         let (rows, space) = (band.rows(), band.space());
-        canvas.start(space, picture.view.columns as usize, rows.len());
-        for names in names.chunks(BATCH) {
-            // Pieces lie far apart: fetched in one go, the waits for them overlap.
-            let mut pieces = [Piece::NOTHING; BATCH];
-            let mut outlines = [Outline::NOTHING; BATCH];
-            for (piece, (list, place)) in pieces.iter_mut().zip(picture.named(names)) {
-                *piece = list.pieces[place];
-            }
-            for ((outline, piece), (list, _)) in outlines.iter_mut().zip(&pieces).zip(picture.named(names)) {
-                if let Some(number) = piece.tall() {
-                    *outline = list.tall[number];
-                }
-            }
-            for (piece, outline) in pieces[..names.len()].iter().zip(outlines) {
-                paint_piece(canvas, space, &rows, piece, outline);
-            }
-        }
+        cpu::run(Painting { canvas, picture, names, space, rows: rows.clone() });
         if picture.antialias {
             let patches = picture.named(names).map(|(list, place)| &list.patches[place]);
             let edges = patches.clone().map(|patch| (&patch.outline, patch.count, patch.boundary));
@@ -108,25 +94,85 @@ impl Painter {
     }
 }
 
-/// Paints what of a piece lies in the `rows` of a canvas. `outline` counts where it is tall.
-#[inline(always)]
-fn paint_piece(canvas: &mut Canvas, space: ColorSpace, rows: &Range<i32>, piece: &Piece, outline: Outline) {
-    let own = piece.rows();
-    let (first, end) = (own.start.max(rows.start), own.end.min(rows.end));
-    let width = canvas.width() as i32;
-    let mut brush = piece.run.brush(space, first);
-    let mut lines = canvas.rows_mut((first - rows.start) as usize);
-    if piece.tall().is_none() {
-        // The table of bands names pieces in bands that they have rows in.
-        let cover = piece.cover.get((first - own.start) as usize..(end - own.start) as usize).unwrap_or_default();
-        return cover.iter().zip(&mut lines).for_each(|(span, pixels)| brush.paint(pixels, *span));
-    }
-    let edges = Edges::new(outline);
-    for row in (first..end).step_by(ROWS) {
-        let count = ROWS.min((end - row) as usize);
-        edges.spans(row, width)[..count].iter().zip(&mut lines).for_each(|(span, pixels)| brush.paint(pixels, *span));
+/// Paints pieces into the `rows` of a canvas.
+struct Painting<'a, 'b> {
+    canvas: &'b mut Canvas,
+    picture: &'b Picture<'a>,
+    names: &'a [u32],
+    space: ColorSpace,
+    rows: Range<i32>,
+}
+
+impl Kernel for Painting<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(mut self) {
+        self.canvas.start(self.space, self.picture.view.columns as usize, self.rows.len());
+        let mut pieces = [Piece::NOTHING; BATCH];
+        let mut outlines = [Outline::NOTHING; BATCH];
+        for names in self.names.chunks(BATCH) {
+            // Pieces lie far apart: fetched in one go, the waits for them overlap.
+            for (piece, (list, place)) in pieces.iter_mut().zip(self.picture.named(names)) {
+                *piece = list.pieces[place];
+            }
+            for ((outline, piece), (list, _)) in outlines.iter_mut().zip(&pieces).zip(self.picture.named(names)) {
+                if let Some(number) = piece.edges() {
+                    *outline = list.tall[number];
+                }
+            }
+            for (piece, outline) in pieces[..names.len()].iter().zip(&outlines) {
+                self.paint(piece, outline);
+            }
+        }
     }
 }
+
+impl Painting<'_, '_> {
+    /// Paints what of a piece lies in the rows. `outline` counts where it is tall.
+    #[inline(always)]
+    fn paint(&mut self, piece: &Piece, outline: &Outline) {
+        match piece.shape() {
+            Shape::Small => self.paint_low(piece, &piece.run.brush::<1>(self.space)),
+            Shape::Low => self.paint_low(piece, &piece.run.brush::<PARTS>(self.space)),
+            Shape::Tall => self.paint_tall(piece, outline),
+        }
+    }
+
+    #[inline(always)]
+    fn paint_low<const WIDTH: usize>(&mut self, piece: &Piece, brush: &Brush<'_, WIDTH>) {
+        let (own, seen) = self.rows_of(piece);
+        // The table of bands names pieces in bands that they have rows in.
+        let cover = (seen.start - own.start) as usize..(seen.end - own.start) as usize;
+        let mut rows = self.canvas.rows_mut();
+        let at = (seen.start - self.rows.start) as usize * rows.stride;
+        brush.paint(&mut rows, at, seen.start, piece.cover.get(cover).unwrap_or_default());
+    }
+
+    #[inline(always)]
+    fn paint_tall(&mut self, piece: &Piece, outline: &Outline) {
+        let (edges, (_, seen)) = (Edge::all(outline), self.rows_of(piece));
+        let brush = piece.run.brush::<PARTS>(self.space);
+        let mut rows = self.canvas.rows_mut();
+        for row in seen.clone().step_by(TALL_ROWS) {
+            let found = spans::<TALL_ROWS>(&edges, row, self.picture.view.columns);
+            let count = TALL_ROWS.min((seen.end - row) as usize);
+            let at = (row - self.rows.start) as usize * rows.stride;
+            brush.paint(&mut rows, at, row, &found[..count]);
+        }
+    }
+
+    /// The rows of a piece, and those of them that are painted.
+    #[inline(always)]
+    fn rows_of(&self, piece: &Piece) -> (Range<i32>, Range<i32>) {
+        let own = piece.rows();
+        let seen = own.start.max(self.rows.start)..own.end.min(self.rows.end);
+        (own, seen)
+    }
+}
+
+/// Rows of a tall piece that are looked up together.
+const TALL_ROWS: usize = 8;
 
 /// Low bits of a polygon's name: its place in its list; the others number the list.
 const NAME_BITS: u32 = 14;

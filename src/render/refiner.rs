@@ -81,7 +81,6 @@ impl Span {
     }
 
     /// From `low` to `high`.
-    #[cfg(test)]
     pub(super) fn new(low: i32, high: i32) -> Self {
         Self { low, high }
     }

@@ -3,14 +3,16 @@
 //! In: an outline, colours at its corners; spans of rows. Out: pixels of a canvas. Forbidden here: which pixels a polygon
 //! covers.
 
-use std::ops::Range;
-
 use glam::{Vec3A, Vec4};
-use wide::{f64x2, i16x8, i32x4, i32x8, u8x16};
+use wide::{i16x8, i32x4, i32x8};
 
-use super::canvas::{CHUNK, ColorSpace, Pixel, pixel};
-use super::scan::{Outline, Span};
-use super::shade::{Channels, FRACTION, gradient};
+use super::canvas::{CHUNK, ColorSpace, PART, PARTS, Pixel, Rows, pixel};
+use super::cpu::{self, Kernel};
+use super::scan::Span;
+
+/// Binary digits after the point of a [`Run`]. With 10 before it and a sign they fit 32 bits, in which sums may overflow:
+/// where the polygon is they are right again.
+pub(super) const FRACTION: u32 = 20;
 
 /// Binary digits after the point of the steps within a chunk: with 9 before the point and a sign they fill 16 bits, so
 /// that two pixels go through a register of the smallest size. Each value is rounded twice, to 1/128 level.
@@ -18,7 +20,7 @@ const CHUNK_FRACTION: u32 = 6;
 
 /// How a run's pixels become a canvas's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Way {
+pub(super) enum Way {
     /// Clamped to [0, 255], chunk by chunk.
     Chunks,
     /// Clamped to [0, 255], pixel by pixel: beyond the range of a chunk.
@@ -32,46 +34,19 @@ enum Way {
 pub(super) struct Run {
     /// Channels at the centre of the pixel `origin`, and half a level, so that cutting off rounds; in the order of a
     /// [`Pixel`], as all here.
-    base: [i32; 3],
+    pub(super) base: [i32; 3],
     /// Change a column.
-    right: [i32; 3],
+    pub(super) right: [i32; 3],
     /// Change a row.
-    down: [i32; 3],
+    pub(super) down: [i32; 3],
     /// Column and row; sides of surfaces fit.
-    origin: [u16; 2],
-    way: Way,
+    pub(super) origin: [u16; 2],
+    pub(super) way: Way,
 }
 
 impl Run {
     pub(super) const NOTHING: Self =
         Self { base: [0; 3], right: [0; 3], down: [0; 3], origin: [0; 2], way: Way::Chunks };
-
-    /// The colour of a polygon, `extent` pixels large, on a canvas, from a pixel within its bounds on. `is_beyond` as of
-    /// [`Polygon`](super::slice::Polygon).
-    #[inline(always)]
-    pub(super) fn new(
-        outline: Outline,
-        (colors, is_beyond): ([Vec4; 4], bool),
-        space: ColorSpace,
-        [column, row]: [i32; 2],
-        extent: f64,
-    ) -> Self {
-        // Beyond this, rounding of the gradient shows: a sliver that is thinner than any pixel's digits has one colour.
-        const STEEPEST: f64 = (1u64 << 30) as f64;
-        let (way, colors) = if is_beyond { clamped(&colors, space) } else { (Way::Chunks, colors) };
-        let [mut right, mut down] = gradient(outline, &colors);
-        let extent = if extent > 1.0 { extent } else { 1.0 };
-        if !right.times(extent).are_below(STEEPEST) || !down.times(extent).are_below(STEEPEST) {
-            (right, down) = (Channels::ZERO, Channels::ZERO);
-        }
-        let (corner_x, corner_y) = (outline.x.to_array()[0], outline.y.to_array()[0]);
-        let x = f64::from(column) + 0.5 - corner_x;
-        let y = f64::from(row) + 0.5 - corner_y;
-        let half = Channels { pair: f64x2::splat(0.5), third: 0.5 };
-        let base = Channels::new(colors[0]).plus(right.times(x)).plus(down.times(y)).plus(half);
-        let origin = [column as u16, row as u16];
-        Self { base: base.fixed(), right: right.fixed(), down: down.fixed(), origin, way }
-    }
 
     /// The row of the pixel that it starts from.
     #[inline]
@@ -79,26 +54,24 @@ impl Run {
         self.origin[1].into()
     }
 
-    /// What paints spans of a canvas, row by row from `row` on.
+    /// What paints spans of a canvas, in chunks of so many registers of [`PART`] pixels.
     #[inline(always)]
-    pub(super) fn brush(&self, space: ColorSpace, row: i32) -> Brush<'_> {
-        let [second, first, third] = self.right;
-        let right = i32x4::new([second, first, third, 0]);
-        let twice = right + right;
-        let lanes = [pack(to_chunk(i32x4::ZERO), to_chunk(right)), pack(to_chunk(twice), to_chunk(twice + right))];
-        let mut value = self.base;
-        let below = row - self.row();
-        // Most pieces begin in the band that is painted.
-        if below != 0 {
-            value = std::array::from_fn(|i| value[i].wrapping_add(self.down[i].wrapping_mul(below)));
-        }
-        Brush { run: self, space, value, lanes, advance: twice + twice }
+    pub(super) fn brush<const WIDTH: usize>(&self, space: ColorSpace) -> Brush<'_, WIDTH> {
+        let right = four(self.right);
+        let pair = |first: i32x4| pack(to_chunk(first + HALF), to_chunk(first + right + HALF));
+        let mut first = i32x4::ZERO;
+        let lanes = [(); WIDTH].map(|()| {
+            let [low, high] = [pair(first), pair(first + right + right)].map(i16x8::to_array);
+            first += right << 2;
+            std::array::from_fn(|i| if i < 8 { low[i] } else { high[i - 8] })
+        });
+        Brush { run: self, space, right, lanes }
     }
 }
 
 /// How a polygon is painted whose colours are beyond the range of chunks, and these as far as digits go: in RGB.
 #[cold]
-fn clamped(colors: &[Vec4; 4], space: ColorSpace) -> (Way, [Vec4; 4]) {
+pub(super) fn clamped(colors: &[Vec4; 4], space: ColorSpace) -> (Way, [Vec4; 4]) {
     // Far beyond what is seen, but within the digits.
     const FARTHEST: Vec3A = Vec3A::splat(767.0);
     let way = if space == ColorSpace::Rgb { Way::Pixels } else { Way::Converted };
@@ -107,102 +80,150 @@ fn clamped(colors: &[Vec4; 4], space: ColorSpace) -> (Way, [Vec4; 4]) {
 
 /// A run at work.
 #[derive(Debug)]
-pub(super) struct Brush<'a> {
+pub(super) struct Brush<'a, const WIDTH: usize> {
     run: &'a Run,
     space: ColorSpace,
-    /// Channels in the column of the origin, in the next row.
-    value: [i32; 3],
-    /// The steps from a chunk's first pixel to each, two pixels to a register.
-    lanes: [i16x8; 2],
-    /// The step to the next chunk.
-    advance: i32x4,
+    /// The step to the next pixel.
+    right: i32x4,
+    /// The steps from a chunk's first pixel to each.
+    lanes: [[i16; 4 * PART]; WIDTH],
 }
 
-impl Brush<'_> {
-    /// Paints what a span holds of the next row. Colours are clamped to [0, 255] pixel by pixel and rounded to the
-    /// nearest level.
+impl<const WIDTH: usize> Brush<'_, WIDTH> {
+    /// Paints spans of the rows from `row` on; `at` is where the first of them begins. Colours are clamped to [0, 255]
+    /// pixel by pixel and rounded to the nearest level.
     #[inline(always)]
-    pub(super) fn paint(&mut self, pixels: &mut [Pixel], span: Span) {
-        let columns = span.columns();
-        if !columns.is_empty() {
-            self.paint_columns(pixels, columns);
+    pub(super) fn paint(&self, rows: &mut Rows<'_>, mut at: usize, row: i32, spans: &[Span]) {
+        let Run { base, down, origin, way, .. } = self.run;
+        let down = four(*down);
+        // In the column of the origin.
+        let mut value = four(*base) + down * i32x4::splat(row - i32::from(origin[1])) + HALF;
+        for span in spans {
+            let columns = span.columns();
+            if !columns.is_empty() {
+                let first = value + self.right * i32x4::splat(columns.start as i32 - i32::from(origin[0]));
+                let (start, count) = (at + columns.start, columns.len());
+                if *way == Way::Chunks {
+                    self.paint_chunks(rows, start, count, first);
+                } else {
+                    let [second, first, third, _] = (first - HALF).to_array();
+                    self.paint_pixels(rows, start, count, [second, first, third]);
+                }
+            }
+            value += down;
+            at += rows.stride;
         }
-        let Run { down, .. } = self.run;
-        self.value = [0, 1, 2].map(|i| self.value[i].wrapping_add(down[i]));
     }
 
     #[inline(always)]
-    fn paint_columns(&self, pixels: &mut [Pixel], columns: Range<usize>) {
-        let Run { right, origin, way, .. } = self.run;
-        let x = (columns.start as i32).wrapping_sub(origin[0].into());
-        let at = |i: usize| self.value[i].wrapping_add(right[i].wrapping_mul(x));
-        let values = [at(0), at(1), at(2)];
-        if *way != Way::Chunks {
-            return self.paint_pixels(&mut pixels[columns], values);
+    fn paint_chunks(&self, rows: &mut Rows<'_>, mut start: usize, mut left: usize, mut value: i32x4) {
+        while left > WIDTH * PART {
+            let Some(chunk) = rows.chunk_mut::<WIDTH>(start) else { return };
+            chunk.iter_mut().zip(self.painted(value)).for_each(|(bytes, painted)| *bytes = painted);
+            value += self.right * i32x4::splat((WIDTH * PART) as i32);
+            start += WIDTH * PART;
+            left -= WIDTH * PART;
         }
-        let mut value = i32x4::new([values[0], values[1], values[2], 0]);
-        let mut left = columns.len();
-        for chunk in pixels[columns.start..].as_chunks_mut::<CHUNK>().0 {
-            let start = to_chunk(value);
-            let start = pack(start, start);
-            // Saturates to [0, 255].
-            let painted = u8x16::narrow_i16x8(
-                (start + self.lanes[0]) >> CHUNK_FRACTION as i32,
-                (start + self.lanes[1]) >> CHUNK_FRACTION as i32,
-            );
-            if left <= CHUNK {
-                return write(chunk, painted, left);
+        let Some(chunk) = rows.chunk_mut::<WIDTH>(start) else { return };
+        for ((bytes, painted), mask) in chunk.iter_mut().zip(self.painted(value)).zip(MASKS[left & MOST]) {
+            for ((byte, painted), mask) in bytes.iter_mut().zip(painted).zip(mask) {
+                *byte = painted & mask | *byte & !mask;
             }
-            write(chunk, painted, CHUNK);
-            left -= CHUNK;
-            value += self.advance;
         }
+    }
+
+    /// The pixels of a chunk, given the value at the first.
+    #[inline(always)]
+    fn painted(&self, value: i32x4) -> [[u8; 4 * PART]; WIDTH] {
+        let start = to_chunk(value);
+        // Plain lists: they become registers as wide as there are, which types of a fixed width do not.
+        let [a, b, c, d, ..] = pack(start, start).to_array();
+        let start = [a, b, c, d, a, b, c, d, a, b, c, d, a, b, c, d];
+        let mut painted = [[0; 4 * PART]; WIDTH];
+        for (painted, lanes) in painted.iter_mut().zip(&self.lanes) {
+            for ((byte, start), step) in painted.iter_mut().zip(start).zip(lanes) {
+                *byte = (start.wrapping_add(*step) >> CHUNK_FRACTION).clamp(0, 255) as u8;
+            }
+        }
+        painted
     }
 
     #[inline(never)]
-    fn paint_pixels(&self, pixels: &mut [Pixel], mut values: [i32; 3]) {
-        for place in pixels {
-            let [g, r, b] = values.map(|v| (v >> FRACTION).clamp(0, 255));
-            *place = pixel(match self.run.way {
-                Way::Converted => self.space.of_levels([r, g, b]),
-                Way::Chunks | Way::Pixels => [r, g, b].map(|v| v as u8),
-            });
-            values = std::array::from_fn(|i| values[i].wrapping_add(self.run.right[i]));
+    fn paint_pixels(&self, rows: &mut Rows<'_>, start: usize, count: usize, values: [i32; 3]) {
+        let Some(pixels) = rows.pixels.get_mut(start..start + count) else { return };
+        cpu::run(Pixelwise { run: self.run, space: self.space, pixels, values });
+    }
+}
+
+/// Pixels side by side that are clamped, and converted if need be, one by one.
+struct Pixelwise<'a> {
+    run: &'a Run,
+    space: ColorSpace,
+    pixels: &'a mut [Pixel],
+    /// Channels at the first of them.
+    values: [i32; 3],
+}
+
+impl Kernel for Pixelwise<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { run: Run { right, way, .. }, space, pixels, mut values } = self;
+        for chunk in pixels.chunks_mut(CHUNK) {
+            let mut levels = [[0; CHUNK]; 3];
+            for ((levels, value), right) in levels.iter_mut().zip(&mut values).zip(right) {
+                for (i, level) in levels.iter_mut().enumerate() {
+                    *level = (value.wrapping_add(right.wrapping_mul(i as i32)) >> FRACTION).clamp(0, 255);
+                }
+                *value = value.wrapping_add(right.wrapping_mul(CHUNK as i32));
+            }
+            let mut painted = [[0; 4]; CHUNK];
+            for (i, place) in painted.iter_mut().enumerate() {
+                let rgb = [levels[1][i], levels[0][i], levels[2][i]];
+                *place = pixel(if *way == Way::Converted { space.of_levels(rgb) } else { rgb.map(|v| v as u8) });
+            }
+            match chunk.first_chunk_mut::<CHUNK>() {
+                Some(chunk) => *chunk = painted,
+                None => chunk.iter_mut().zip(painted).for_each(|(place, painted)| *place = painted),
+            }
         }
     }
 }
 
-/// Writes the first `count` pixels of a chunk.
-#[inline]
-fn write(chunk: &mut [Pixel; CHUNK], painted: u8x16, count: usize) {
-    let Some(bytes) = chunk.as_flattened_mut().first_chunk_mut::<{ 4 * CHUNK }>() else { return };
-    let mask = u8x16::new(MASKS[count]);
-    *bytes = ((painted & mask) | (u8x16::new(*bytes) & !mask)).to_array();
+/// Half a digit of a chunk, so that cutting off rounds.
+const HALF: i32x4 = i32x4::new([1 << (FRACTION - CHUNK_FRACTION - 1); 4]);
+
+#[inline(always)]
+fn four([a, b, c]: [i32; 3]) -> i32x4 {
+    i32x4::new([a, b, c, 0])
 }
 
-/// All bits of the bytes of the first so many pixels.
-const MASKS: [[u8; 4 * CHUNK]; CHUNK + 1] = {
-    let mut masks = [[0; 4 * CHUNK]; CHUNK + 1];
+/// The last of [`MASKS`]: all bits of a number below its length.
+const MOST: usize = 15;
+
+/// All bits of the bytes of the first so many pixels of a chunk.
+const MASKS: [[[u8; 16]; PARTS]; MOST + 1] = {
+    let mut masks = [[[0; 16]; PARTS]; MOST + 1];
     let mut i = 0;
-    while i < (CHUNK + 1) * 4 * CHUNK {
+    while i < (MOST + 1) * 4 * CHUNK {
         let (count, byte) = (i / (4 * CHUNK), i % (4 * CHUNK));
         if byte < 4 * count {
-            masks[count][byte] = 255;
+            masks[count][byte / 16][byte % 16] = 255;
         }
         i += 1;
     }
     masks
 };
 
-/// Rounds values to the digits of a chunk.
-#[inline]
+/// Cuts values off to the digits of a chunk.
+#[inline(always)]
 fn to_chunk(values: i32x4) -> i32x4 {
-    const SHIFT: u32 = FRACTION - CHUNK_FRACTION;
-    (values + i32x4::new([1 << (SHIFT - 1); 4])) >> SHIFT as i32
+    values >> (FRACTION - CHUNK_FRACTION) as i32
 }
 
 /// Two pixels side by side. Where a polygon is, values fit 16 bits.
-#[inline]
+#[inline(always)]
 fn pack(first: i32x4, second: i32x4) -> i16x8 {
     let ([a, b, c, d], [e, f, g, h]) = (first.to_array(), second.to_array());
     i16x8::from_i32x8_saturate(i32x8::new([a, b, c, d, e, f, g, h]))
@@ -211,7 +232,11 @@ fn pack(first: i32x4, second: i32x4) -> i16x8 {
 #[cfg(test)]
 mod tests {
     use super::super::canvas::channels;
+    use std::ops::Range;
+
     use super::super::grid::{GRID_BITS, GridPoint};
+    use super::super::scan::Outline;
+    use super::super::setup::tests::run_of;
     use super::*;
 
     /// A triangle of whole pixels, turning from +x to +y.
@@ -229,9 +254,14 @@ mod tests {
     fn painted(size: i64, colors: [[f32; 3]; 3], count: usize) -> Vec<[u8; 3]> {
         let outline = triangle([[0, 0], [size, 0], [0, size]]);
         let colors = corner_colors(colors, ColorSpace::Rgb);
-        let run = Run::new(outline, colors, ColorSpace::Rgb, [0, 0], size as f64);
+        let run = run_of(&outline, colors, ColorSpace::Rgb);
         let mut row = vec![[1; 4]; count + CHUNK];
-        run.brush(ColorSpace::Rgb, 0).paint(&mut row, Span::of(0..count));
+        run.brush::<PARTS>(ColorSpace::Rgb).paint(
+            &mut Rows { pixels: &mut row, stride: 0 },
+            0,
+            0,
+            &[Span::of(0..count)],
+        );
         assert!(row[count..] == [[1; 4]; CHUNK], "pixels beyond the span are left alone");
         row[..count].iter().map(|&pixel| channels(pixel)).collect()
     }
@@ -281,8 +311,9 @@ mod tests {
         let outline = triangle([[0, 0], [90, 0], [0, 70]]);
         let paint = |colors, space, row, columns: Range<usize>| {
             let mut found = [[0; 4]; 110];
-            let run = Run::new(outline, corner_colors(colors, space), space, [0, 0], 90.0);
-            run.brush(space, row).paint(&mut found, Span::of(columns.clone()));
+            let run = run_of(&outline, corner_colors(colors, space), space);
+            let mut rows = Rows { pixels: &mut found, stride: 0 };
+            run.brush::<PARTS>(space).paint(&mut rows, 0, row, &[Span::of(columns.clone())]);
             columns.map(|x| channels(found[x])).collect::<Vec<_>>()
         };
         for matrix in [crate::video::YuvMatrix::Bt601, crate::video::YuvMatrix::Bt709] {

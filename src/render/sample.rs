@@ -60,11 +60,9 @@ fn sample_tet(tet: [IVec3; 4], t: i32, view: &View, rows: Range<i32>, mut pixel:
         let picked = [0, last - 1, last];
         let triangle = picked.map(|corner| grid[corner]);
         let outline = Outline::new(&triangle);
-        let Some(seen) = outline.hull().centers([view.columns, view.rows]).filter(|_| is_positive(triangle)) else {
-            continue;
-        };
-        let both = seen.rows.start.max(rows.start)..seen.rows.end.min(rows.end);
-        scan(&outline, view.columns, both, |row, columns| {
+        let seen = outline.hull().centers(view.columns, rows.clone());
+        let Some((_, rows)) = seen.filter(|_| is_positive(triangle)) else { continue };
+        scan(&outline, view.columns, rows, |row, columns| {
             for column in columns {
                 let share = planar_weights(triangle, [column as f64 + 0.5, f64::from(row) + 0.5]);
                 let mut weights = [0.0f64; 4];

@@ -4,14 +4,15 @@ use glam::IVec3;
 
 use super::active::Active;
 use super::canvas::ColorSpace;
-use super::complex::{Complex, FINE_BITS};
-use super::draw::Pieces;
+use super::complex::{Complex, FINE_BITS, emptied};
 use super::interfaces::{Faces, Interfaces, child_faces};
+use super::lanes::LANES;
 use super::paint::Painters;
 use super::parallel::{List, fill_chunks};
+use super::piece::Pieces;
 use super::refiner::{FineNode, Refiner, Span, fine_color};
 use super::second::Second;
-use super::slice::{Polygon, SliceNode, slice};
+use super::slice::{Polygons, SliceNode, Slices};
 use super::view::Viewport;
 use super::window::Extents;
 use crate::mesh::{Domain, MeshCounts, MeshTail, TetMesh};
@@ -22,9 +23,6 @@ const SECOND_TETS: usize = 1 << 19;
 
 /// Tets that a thread slices at a time.
 pub(super) const CHUNK: usize = 512;
-
-/// Tets whose corners are fetched at a time.
-const BATCH: usize = 32;
 
 /// A slab's control mesh, ready to be cut by planes. It grows with the mesh; what was refined is kept.
 #[derive(Debug)]
@@ -72,6 +70,19 @@ impl Scene {
         }
     }
 
+    /// A scene without tets in the memory of this one, which the next slab of a stream fills as far again.
+    pub fn emptied(self, domain: Domain) -> Self {
+        Self {
+            complex: self.complex.emptied(),
+            colors: emptied(self.colors),
+            nodes: emptied(self.nodes),
+            spans: emptied(self.spans),
+            pieces: self.pieces,
+            painters: self.painters,
+            ..Self::new(domain)
+        }
+    }
+
     /// The box of the slab.
     pub fn domain(&self) -> &Domain {
         &self.domain
@@ -112,7 +123,11 @@ impl Scene {
         for node in self.nodes.len()..self.complex.nodes.len() {
             self.nodes.push(self.slice_node(node));
         }
-        let span = |corners: &[u32; 4]| Span::of(corners.map(|node| self.complex.position(node)));
+        let time = |node: u32| self.nodes[node as usize].t();
+        let span = |&[a, b, c, d]: &[u32; 4]| {
+            let [a, b, c, d] = [time(a), time(b), time(c), time(d)];
+            Span::new(a.min(b).min(c.min(d)), a.max(b).max(c.max(d)))
+        };
         self.spans.extend(self.complex.tets[self.spans.len()..].iter().map(span));
     }
 
@@ -134,17 +149,17 @@ impl Scene {
         self.interfaces.any()
     }
 
-    /// Cuts the scene, subdivided `levels` times, at `t` (fine units). `make` appends to a list what the caller keeps
-    /// of each polygon, given the control tet. Lists, one after the other, hold polygons in the order
+    /// Cuts the scene, subdivided `levels` times, at `t` (fine units). `take` appends to a list what the caller keeps
+    /// of polygons; what it works with it gets with each. Lists, one after the other, hold polygons in the order
     /// of control tets and of children; what was in them is gone. Given a part of the picture, and the size of the surface
     /// that it is stretched over, polygons that are not seen there may be left out.
-    pub(super) fn cut<L: List>(
+    pub(super) fn cut<L: List, S: Default>(
         &mut self,
         t: i32,
         levels: u8,
         part: Option<(Viewport, (u32, u32))>,
         lists: &mut Vec<L>,
-        make: impl Fn(&mut L, u32, Polygon<'_>) + Sync + Send,
+        take: impl Fn(&mut L, &Polygons, &mut S) + Sync + Send,
     ) {
         if levels == 0 {
             let mut tets = self.active.cut(&self.spans, t);
@@ -155,21 +170,17 @@ impl Scene {
                 seen = tets.iter().copied().filter(|&tet| self.extents.is_seen(tet, &window)).collect();
                 tets = &seen;
             }
-            let corners = |tet: u32| {
-                let [a, b, c, d] = self.complex.tets[tet as usize];
-                let node = |node: u32| self.nodes[node as usize];
-                [node(a), node(b), node(c), node(d)]
-            };
             return fill_chunks(lists, tets.len(), CHUNK, |list, run| {
-                for tets in tets[run].chunks(BATCH) {
-                    // Nodes lie far apart: fetched in one go, the waits for them overlap.
-                    let mut nodes = [[SliceNode::ZERO; 4]; BATCH];
-                    nodes.iter_mut().zip(tets).for_each(|(nodes, &tet)| *nodes = corners(tet));
-                    for ([a, b, c, d], &tet) in nodes.iter().zip(tets) {
-                        if let Some(polygon) = slice([a, b, c, d], t, self.interfaces.faces(tet)) {
-                            make(list, tet, polygon);
-                        }
+                let (mut slices, mut table) = (Slices::new(), S::default());
+                for tets in tets[run].chunks(LANES) {
+                    let nodes = |tet: u32| self.complex.tets[tet as usize].map(|node| &self.nodes[node as usize]);
+                    // Nodes lie far apart: looked at in one go, the waits for them overlap.
+                    let mut above = [0; LANES];
+                    above.iter_mut().zip(tets).for_each(|(above, &tet)| *above = SliceNode::above(nodes(tet), t));
+                    for (&tet, above) in tets.iter().zip(above) {
+                        slices.push(tet, nodes(tet), above, self.interfaces.faces(tet));
                     }
+                    slices.cut(t, |polygons| take(list, polygons, &mut table));
                 }
             });
         }
@@ -180,25 +191,21 @@ impl Scene {
             if !self.refiner.take_changed().is_empty() {
                 self.second = Second::default();
             }
-            return collect(lists, &tets, |polygons, tet| {
-                let parent = Parent {
-                    level: (&self.refiner, &self.complex),
-                    tet,
-                    faces: self.interfaces.faces(tet),
-                    space: self.space,
-                };
-                parent.slice_children(t, |polygon| make(polygons, tet, polygon));
+            return cut_children(lists, &tets, t, take, |tet| Parent {
+                level: (&self.refiner, &self.complex),
+                tet,
+                control: tet,
+                faces: self.interfaces.faces(tet),
+                space: self.space,
             });
         }
         self.refine_twice(t);
         let tets = self.second.cut(t);
-        let second = &self.second;
-        collect(lists, &tets, |polygons, tet| {
-            let control = second.parent(tet);
+        cut_children(lists, &tets, t, take, |tet| {
+            let control = self.second.parent(tet);
             let child = self.refiner.children(control)[tet as usize % 8];
             let faces = child_faces(child, self.interfaces.faces(control));
-            let parent = Parent { level: second.level(), tet, faces, space: self.space };
-            parent.slice_children(t, |polygon| make(polygons, control, polygon));
+            Parent { level: self.second.level(), tet, control, faces, space: self.space }
         });
     }
 
@@ -237,15 +244,35 @@ impl Scene {
     }
 }
 
-/// Runs `work` on each of `tets`, on any number of threads.
-fn collect<L: List>(lists: &mut Vec<L>, tets: &[u32], work: impl Fn(&mut L, u32) + Sync + Send) {
-    fill_chunks(lists, tets.len(), CHUNK, |list, run| tets[run].iter().for_each(|&tet| work(list, tet)));
+/// Cuts the children of refined tets, on any number of threads.
+fn cut_children<'a, L: List, S: Default>(
+    lists: &mut Vec<L>,
+    tets: &[u32],
+    t: i32,
+    take: impl Fn(&mut L, &Polygons, &mut S) + Sync + Send,
+    parent: impl Fn(u32) -> Parent<'a> + Sync + Send,
+) {
+    fill_chunks(lists, tets.len(), CHUNK, |list, run| {
+        let (mut slices, mut table) = (Slices::new(), S::default());
+        for &tet in &tets[run] {
+            parent(tet).push_children(t, &mut slices);
+            if slices.room() < CHILDREN_A_TET {
+                slices.cut(t, |polygons| take(list, polygons, &mut table));
+            }
+        }
+        slices.cut(t, |polygons| take(list, polygons, &mut table));
+    });
 }
+
+/// Children of a refined tet.
+const CHILDREN_A_TET: usize = 8;
 
 /// A refined tet.
 struct Parent<'a> {
     level: (&'a Refiner, &'a Complex),
     tet: u32,
+    /// The control tet that it belongs to.
+    control: u32,
     /// Its faces between labels.
     faces: Faces,
     space: ColorSpace,
@@ -253,12 +280,13 @@ struct Parent<'a> {
 
 impl Parent<'_> {
     #[inline]
-    fn slice_children(&self, t: i32, mut polygon: impl FnMut(Polygon<'_>)) {
+    fn push_children(&self, t: i32, slices: &mut Slices) {
         let (refiner, complex) = self.level;
         let nodes = refiner.ten(complex, self.tet).map(|node| SliceNode::new(&node, self.space));
         for child in refiner.children(self.tet) {
             let faces = child_faces(*child, self.faces);
-            slice(child.map(|i| &nodes[usize::from(i)]), t, faces).into_iter().for_each(&mut polygon);
+            let corners = child.map(|i| &nodes[usize::from(i)]);
+            slices.push(self.control, corners, SliceNode::above(corners, t), faces);
         }
     }
 }

@@ -4,6 +4,7 @@ use glam::{DVec2, Vec3};
 
 use super::canvas::ColorSpace;
 use super::complex::FINE_BITS;
+use super::lanes::Lanes;
 use super::scene::Scene;
 use super::view::plane;
 use crate::mesh::TetMesh;
@@ -29,14 +30,20 @@ pub fn cross_section(mesh: &TetMesh, frame: f64, levels: u8) -> Vec<SectionPolyg
     scene.extend(mesh);
     let fine = f64::from(mesh.domain.unit()) * f64::from(1 << FINE_BITS);
     let mut lists: Vec<Vec<SectionPolygon>> = Vec::new();
-    scene.cut(plane(&mesh.domain, frame), levels, None, &mut lists, |polygons, tet, polygon| {
-        let count = usize::from(polygon.count);
-        polygons.push(SectionPolygon {
-            tet,
-            label: mesh.tet_label(tet as usize),
-            corners: polygon.places[..count].iter().map(|place| DVec2::from_array(place.to_array()) / fine).collect(),
-            colors: polygon.colors()[..count].iter().map(|color| ColorSpace::Rgb.to_rgb(*color).into()).collect(),
-        });
+    scene.cut(plane(&mesh.domain, frame), levels, None, &mut lists, |list, polygons, (): &mut ()| {
+        list.extend((0..polygons.count).map(|lane| {
+            let (tet, count) = (polygons.tets[lane], usize::from(polygons.corners[lane]));
+            let corner = |[x, y]: &[Lanes<f64>; 2]| DVec2::new(x[lane], y[lane]) / fine;
+            SectionPolygon {
+                tet,
+                label: mesh.tet_label(tet as usize),
+                corners: polygons.places[..count].iter().map(corner).collect(),
+                colors: polygons.colors(lane)[..count]
+                    .iter()
+                    .map(|color| ColorSpace::Rgb.to_rgb(*color).into())
+                    .collect(),
+            }
+        }));
     });
     lists.concat()
 }

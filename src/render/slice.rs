@@ -1,10 +1,12 @@
 //! The plane t = c through a tet: a triangle or a quad (§II: a frame is a cross-section of the mesh).
 
 use glam::{DVec2, IVec3, Vec4};
-use wide::{f64x2, f64x4, i32x4};
+use wide::f32x4;
 
 use super::canvas::ColorSpace;
+use super::cpu::{self, Kernel};
 use super::interfaces::Faces;
+use super::lanes::{LANES, Lanes};
 use super::refiner::FineNode;
 
 /// Edges that the plane crosses, as (corner below, corner above), for each set of corners above (bit i: corner i).
@@ -59,104 +61,243 @@ pub(super) fn cross(below: IVec3, above: IVec3, t: i32) -> (f64, DVec2) {
 #[derive(Debug, Clone, Copy)]
 #[repr(align(32))]
 pub(super) struct SliceNode {
-    /// In the channels of the canvas.
-    color: Vec4,
-    /// x and y in fine units.
-    place: [i32; 2],
-    /// In fine units.
-    t: i32,
-    /// Whether [`ColorSpace::holds`] does not say so of the colour.
-    is_beyond: bool,
+    /// Three channels of the canvas, and 0.
+    color: [f32; 4],
+    /// x, y and t in fine units, and 1 where [`ColorSpace::holds`] does not say so of the colour, else 0.
+    place: [i32; 4],
 }
 
 impl SliceNode {
-    pub(super) const ZERO: Self = Self { color: Vec4::ZERO, place: [0; 2], t: 0, is_beyond: false };
+    const NOTHING: Self = Self { color: [0.0; 4], place: [0; 4] };
 
     pub(super) fn new(node: &FineNode, space: ColorSpace) -> Self {
         let (IVec3 { x, y, z }, rgb) = (node.position, node.levels());
-        Self { color: space.of_rgb(rgb), place: [x, y], t: z, is_beyond: !space.holds(rgb) }
+        Self { color: space.of_rgb(rgb).to_array(), place: [x, y, z, i32::from(!space.holds(rgb))] }
     }
 
-    #[inline]
-    fn place(&self) -> f64x2 {
-        f64x2::new([self.place[0].into(), self.place[1].into()])
+    /// In fine units.
+    #[inline(always)]
+    pub(super) fn t(&self) -> i32 {
+        self.place[2]
+    }
+
+    /// Which of four corners lie above the plane at `t`, as [`above`] says.
+    #[inline(always)]
+    pub(super) fn above(nodes: [&Self; 4], t: i32) -> usize {
+        let is_above = |i: usize| usize::from(nodes[i].t() >= t) << i;
+        is_above(0) | is_above(1) | is_above(2) | is_above(3)
+    }
+
+    #[inline(always)]
+    fn is_beyond(&self) -> bool {
+        self.place[3] != 0
     }
 }
 
-/// A tet's part of a slice: a convex polygon.
+/// What a set of corners above says of a slice.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Polygon<'a> {
-    /// x and y of the corners in fine units; a triangle's last one stands twice.
-    pub(super) places: [f64x2; 4],
-    /// Corners: 3 or 4.
-    pub(super) count: u8,
-    /// Edges that lie between labels, as far as interfaces are known; bit i: the edge from corner i to the next.
-    pub(super) boundary: u8,
-    /// Whether a colour is beyond what [`ColorSpace::holds`].
-    pub(super) is_beyond: bool,
-    /// For each corner the ends of the tet's edge, below and above, and the part of the way between them.
-    edges: [[&'a SliceNode; 2]; 4],
-    parts: [f64; 4],
+struct Case {
+    /// The corners below, then those above, in the order that [`ends`] expects.
+    order: [u8; 4],
+    /// Corners below.
+    below: u8,
+    /// Corners of the polygon: 3, 4, or 0 where there is none.
+    corners: u8,
 }
 
-impl Polygon<'_> {
-    /// The colours at the corners, in the channels of the canvas.
-    #[inline]
-    pub(super) fn colors(&self) -> [Vec4; 4] {
-        let color = |i: usize| {
-            let [low, high] = [self.edges[i][0].color, self.edges[i][1].color];
-            // Exact where both ends are equal.
-            low + (high - low) * self.parts[i] as f32
+/// As of [`SLICES`].
+const CASES: [Case; 16] = {
+    let mut cases = [Case { order: [0; 4], below: 0, corners: 0 }; 16];
+    let mut set = 1;
+    while set < 15 {
+        let (slice, below) = (SLICES[set], 4 - (set as u32).count_ones() as u8);
+        let order = match below {
+            1 => [slice[0][0], slice[0][1], slice[1][1], slice[2][1]],
+            2 => [slice[0][0], slice[2][0], slice[0][1], slice[1][1]],
+            _ => [slice[0][0], slice[1][0], slice[2][0], slice[0][1]],
         };
-        [color(0), color(1), color(2), color(3)]
+        cases[set] = Case { order, below, corners: slice.len() as u8 };
+        set += 1;
     }
-}
-
-/// [`SLICES`] of four corners: a triangle's last one twice.
-const PADDED: [[[u8; 2]; 4]; 16] = {
-    let mut padded = [[[0; 2]; 4]; 16];
-    let mut i = 0;
-    while i < 16 * 4 {
-        let (slice, corner) = (SLICES[i / 4], i % 4);
-        if !slice.is_empty() {
-            padded[i / 4][corner] = slice[if corner < slice.len() { corner } else { slice.len() - 1 }];
-        }
-        i += 1;
-    }
-    padded
+    cases
 };
 
-/// Slices one tet; `None` if the plane does not cut it. Corners are computed as in [`cross`].
-#[inline(always)]
-pub(super) fn slice<'a>(nodes: [&'a SliceNode; 4], t: i32, faces: Faces) -> Option<Polygon<'a>> {
-    let is_above = |i: usize| usize::from(nodes[i].t >= t) << i;
-    let set = is_above(0) | is_above(1) | is_above(2) | is_above(3);
-    let count = SLICES[set].len();
-    if count == 0 {
-        return None;
+/// Tets that a plane cuts: the corners of each that lie below it, then those above.
+#[derive(Debug)]
+pub(super) struct Slices {
+    nodes: [Lanes<SliceNode>; 4],
+    /// Corners below the plane: 1 to 3.
+    below: Lanes<u32>,
+    polygons: Polygons,
+}
+
+/// What a plane cuts out of tets: convex polygons, side by side.
+#[derive(Debug)]
+pub(super) struct Polygons {
+    /// How many there are.
+    pub(super) count: usize,
+    /// The control tet that each belongs to.
+    pub(super) tets: Lanes<u32>,
+    /// x and y of the corners in fine units; a triangle's last one stands twice.
+    pub(super) places: [[Lanes<f64>; 2]; 4],
+    /// The colours there, in the channels of the canvas.
+    pub(super) colors: [[Lanes<f32>; 3]; 4],
+    /// Corners: 3 or 4.
+    pub(super) corners: Lanes<u8>,
+    /// Edges that lie between labels, as far as interfaces are known; bit i: the edge from corner i to the next.
+    pub(super) boundaries: Lanes<u8>,
+    /// Whether a colour is beyond what [`ColorSpace::holds`].
+    pub(super) are_beyond: Lanes<bool>,
+}
+
+impl Polygons {
+    pub(super) const NONE: Self = Self {
+        count: 0,
+        tets: [0; LANES],
+        places: [[[0.0; LANES]; 2]; 4],
+        colors: [[[0.0; LANES]; 3]; 4],
+        corners: [0; LANES],
+        boundaries: [0; LANES],
+        are_beyond: [false; LANES],
+    };
+
+    /// The colours of one of them at its corners.
+    #[inline]
+    pub(super) fn colors(&self, lane: usize) -> [Vec4; 4] {
+        [0, 1, 2, 3].map(|corner| {
+            let [first, second, third] = &self.colors[corner];
+            Vec4::new(first[lane], second[lane], third[lane], 0.0)
+        })
     }
-    let ends = |i: usize| {
-        let [below, above] = PADDED[set][i];
-        [nodes[usize::from(below & 3)], nodes[usize::from(above & 3)]]
-    };
-    let edges = [ends(0), ends(1), ends(2), ends(3)];
-    let way = |i: usize| t - edges[i][0].t;
-    let height = |i: usize| edges[i][1].t - edges[i][0].t;
-    let ways = f64x4::from_i32x4(i32x4::new([way(0), way(1), way(2), way(3)]));
-    let heights = f64x4::from_i32x4(i32x4::new([height(0), height(1), height(2), height(3)]));
-    let parts = (ways / heights).to_array();
-    let place = |i: usize| {
-        let [low, high] = [edges[i][0].place(), edges[i][1].place()];
-        low + (high - low) * f64x2::splat(parts[i])
-    };
-    Some(Polygon {
-        places: [place(0), place(1), place(2), place(3)],
-        count: count as u8,
-        boundary: edges_on(SLICES[set], faces),
-        is_beyond: nodes[0].is_beyond | nodes[1].is_beyond | nodes[2].is_beyond | nodes[3].is_beyond,
-        edges,
-        parts,
-    })
+}
+
+impl Slices {
+    pub(super) fn new() -> Self {
+        Self { nodes: [[SliceNode::NOTHING; LANES]; 4], below: [0; LANES], polygons: Polygons::NONE }
+    }
+
+    /// Adds a tet if a plane cuts it, given its corners above the plane; there must be room for it. `tet` is the control tet
+    /// that it belongs to.
+    #[inline(always)]
+    pub(super) fn push(&mut self, tet: u32, nodes: [&SliceNode; 4], above: usize, faces: Faces) {
+        let (lane, case) = (self.polygons.count, CASES[above & 15]);
+        if case.corners == 0 || lane >= LANES {
+            return;
+        }
+        for (lanes, node) in self.nodes.iter_mut().zip(case.order) {
+            lanes[lane] = *nodes[usize::from(node & 3)];
+        }
+        self.below[lane] = case.below.into();
+        let Polygons { tets, corners, boundaries, are_beyond, count, .. } = &mut self.polygons;
+        tets[lane] = tet;
+        corners[lane] = case.corners;
+        boundaries[lane] = edges_on(SLICES[above & 15], faces);
+        are_beyond[lane] = nodes[0].is_beyond() | nodes[1].is_beyond() | nodes[2].is_beyond() | nodes[3].is_beyond();
+        *count += 1;
+    }
+
+    /// How many more tets there is room for.
+    pub(super) fn room(&self) -> usize {
+        LANES - self.polygons.count
+    }
+
+    /// Hands out what the plane at `t` cuts out of the tets, and forgets these. Corners are computed as in [`cross`].
+    pub(super) fn cut(&mut self, t: i32, take: impl FnOnce(&Polygons)) {
+        cpu::run(Cutting { slices: self, plane: t });
+        take(&self.polygons);
+        self.polygons.count = 0;
+    }
+}
+
+/// What [`Slices::cut`] computes.
+struct Cutting<'a> {
+    slices: &'a mut Slices,
+    plane: i32,
+}
+
+/// The corners of tets, number by number, each by its bits.
+type Corners = [[Lanes<u32>; 4]; 4];
+
+/// Corners of polygons, each by the ends of the tet's edge that it lies on, below and above.
+type Ends = [[Lanes<u32>; 2]; 4];
+
+impl Kernel for Cutting<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Slices { nodes, below, polygons } = self.slices;
+        let masks = [1, 2, 3].map(|count| {
+            let mut mask = [0; LANES];
+            for i in 0..LANES {
+                mask[i] = if below[i] == count { u32::MAX } else { 0 };
+            }
+            mask
+        });
+        let [mut places, mut colors] = [[[[0; LANES]; 4]; 4]; 2];
+        for corner in 0..4 {
+            side_by_side(&nodes[corner], |node| node.place.map(|v| f32::from_bits(v as u32)), &mut places[corner]);
+            side_by_side(&nodes[corner], |node| node.color, &mut colors[corner]);
+        }
+        let mut parts = [[0.0; LANES]; 4];
+        let times = ends(&masks, &places, 2);
+        for (parts, [low, high]) in parts.iter_mut().zip(&times) {
+            for i in 0..LANES {
+                parts[i] = f64::from(self.plane - low[i] as i32) / f64::from(high[i] as i32 - low[i] as i32);
+            }
+        }
+        for axis in 0..2 {
+            for (corner, [low, high]) in ends(&masks, &places, axis).iter().enumerate() {
+                for i in 0..LANES {
+                    let (low, high) = (f64::from(low[i] as i32), f64::from(high[i] as i32));
+                    polygons.places[corner][axis][i] = low + (high - low) * parts[corner][i];
+                }
+            }
+        }
+        for channel in 0..3 {
+            for (corner, [low, high]) in ends(&masks, &colors, channel).iter().enumerate() {
+                for i in 0..LANES {
+                    let (low, high) = (f32::from_bits(low[i]), f32::from_bits(high[i]));
+                    // Exact where both ends are equal.
+                    polygons.colors[corner][channel][i] = low + (high - low) * parts[corner][i] as f32;
+                }
+            }
+        }
+    }
+}
+
+/// Puts numbers of nodes side by side.
+#[inline(always)]
+fn side_by_side(nodes: &Lanes<SliceNode>, numbers: impl Fn(&SliceNode) -> [f32; 4], lanes: &mut [Lanes<u32>; 4]) {
+    for (four, nodes) in nodes.as_chunks::<4>().0.iter().enumerate() {
+        let of = |i: usize| f32x4::new(numbers(&nodes[i]));
+        for (lanes, turned) in lanes.iter_mut().zip(f32x4::transpose([of(0), of(1), of(2), of(3)])) {
+            lanes.as_chunks_mut::<4>().0[four] = turned.to_array().map(f32::to_bits);
+        }
+    }
+}
+
+/// One number of the ends of the tets' edges that the corners of polygons lie on. `masks` say how many of a tet's corners
+/// are below: 1, 2 or 3; these come first, as [`Case::order`] says.
+#[inline(always)]
+fn ends([one, two, three]: &[Lanes<u32>; 3], corners: &Corners, number: usize) -> Ends {
+    let [a, b, c, d] = [0, 1, 2, 3].map(|corner| &corners[corner][number]);
+    let mut ends = [[[0; LANES]; 2]; 4];
+    for i in 0..LANES {
+        // By bits: of a choice between places in memory compilers make a load from one of them, which is slow in lanes.
+        let by_count = |v: [u32; 3]| v[0] & one[i] | v[1] & two[i] | v[2] & three[i];
+        let pick = |mask: u32, v: u32, other: u32| v & mask | other & !mask;
+        let low = by_count([a[i], b[i], c[i]]);
+        ends[0][0][i] = a[i];
+        ends[0][1][i] = by_count([b[i], c[i], d[i]]);
+        ends[1][0][i] = pick(three[i], b[i], a[i]);
+        ends[1][1][i] = pick(one[i], c[i], d[i]);
+        ends[2][0][i] = low;
+        ends[2][1][i] = d[i];
+        ends[3][0][i] = low;
+        ends[3][1][i] = pick(two[i], c[i], d[i]);
+    }
+    ends
 }
 
 #[cfg(test)]

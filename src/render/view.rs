@@ -3,11 +3,9 @@
 use std::ops::Range;
 
 use thiserror::Error;
-use wide::f64x2;
 
 use super::complex::FINE_BITS;
 use super::grid::{GRID_BITS, GridPoint, first_center};
-use super::slice::Polygon;
 use crate::mesh::Domain;
 
 /// The part of the source picture to draw, in source pixels. It is stretched over the whole surface; what lies
@@ -94,17 +92,13 @@ impl View {
     /// Where a point of the slice lies on the surface's grid.
     #[inline]
     pub(super) fn grid(&self, x: f64, y: f64) -> GridPoint {
-        let snap = |v: f64, axis: usize| (v * self.scale[axis] - self.offset[axis] + SNAP) - SNAP;
-        GridPoint::from_px(snap(x, 0), snap(y, 1))
+        GridPoint::from_px(self.px(0, x), self.px(1, y))
     }
 
-    /// The same of a polygon's corners, in pixels.
+    /// The same of one coordinate (axis 0: x, 1: y), in pixels.
     #[inline(always)]
-    pub(super) fn places(&self, polygon: &Polygon<'_>) -> [f64x2; 4] {
-        let (scale, offset, digits) = (f64x2::new(self.scale), f64x2::new(self.offset), f64x2::splat(SNAP));
-        let px = |place: f64x2| (place * scale - offset + digits) - digits;
-        let [a, b, c, d] = polygon.places;
-        [px(a), px(b), px(c), px(d)]
+    pub(super) fn px(&self, axis: usize, v: f64) -> f64 {
+        (v * self.scale[axis] - self.offset[axis] + SNAP) - SNAP
     }
 }
 
