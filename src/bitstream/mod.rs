@@ -18,6 +18,7 @@ mod labels;
 mod limits;
 mod near;
 mod neighbours;
+mod normals;
 mod parser;
 mod positions;
 mod range_coder;

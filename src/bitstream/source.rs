@@ -9,7 +9,7 @@ use glam::IVec3;
 
 use super::colors::{Grains, to_grains};
 use super::connectivity::Apex;
-use super::range_coder::{BitCoder, BitModel, RangeEncoder};
+use super::range_coder::{BitCoder, BitModel, RangeEncoder, SymbolModel};
 use super::slab::Side;
 use super::{MeshFault, WriteError};
 use crate::mesh::{FACES, MeshError, TetMesh, VertexId, WedgeId};
@@ -234,8 +234,8 @@ impl<'a> Writing<'a> {
         Self { source, mesh, low_frames, encoder, tet: 0, vertex: VertexId(0) }
     }
 
-    /// The payload.
-    pub(super) fn finish(self) -> Vec<u8> {
+    /// The bytes of decisions and symbols, and those of raw bits.
+    pub(super) fn finish(self) -> [Vec<u8>; 2] {
         self.encoder.finish()
     }
 
@@ -251,6 +251,12 @@ impl BitCoder for Writing<'_> {
         self.encoder.bit(model, bit)
     }
 
+    #[inline]
+    fn symbol(&mut self, model: &mut SymbolModel, symbol: usize) -> usize {
+        self.encoder.symbol(model, symbol)
+    }
+
+    #[inline]
     fn raw(&mut self, count: u32, value: u32) -> u32 {
         self.encoder.raw(count, value)
     }
@@ -304,6 +310,10 @@ impl Side for Writing<'_> {
 
     fn is_uniform(&self) -> bool {
         self.source.is_uniform
+    }
+
+    fn has_pins(&self) -> bool {
+        self.mesh.pinned.contains(&true)
     }
 
     fn label(&mut self, count: u32) -> u32 {

@@ -6,7 +6,7 @@ use crate::bitstream::MeshFault;
 use glam::Vec3;
 
 use crate::bitstream::colors::{Around, KnownColor, code_color, from_grains};
-use crate::bitstream::extents::size_of;
+use crate::bitstream::extents::size;
 use crate::bitstream::front::Met;
 use crate::bitstream::labels::SameContext;
 use crate::bitstream::vertices::Wedges;
@@ -179,6 +179,7 @@ impl Slab {
         for (closed, edges) in closed.iter().zip(FACE_EDGES) {
             known |= if *closed == Some(label) { edges } else { 0 };
         }
+        // With one label, as often as not, there is none.
         let mut new = !known & ALL_EDGES;
         while new != 0 {
             let [a, b] = EDGES[new.trailing_zeros() as usize % EDGES.len()];
@@ -192,7 +193,7 @@ impl Slab {
         for wedge in self.known.len()..self.mesh.wedges.len() {
             side.check()?;
             let around = self.around(wedge);
-            let step = self.color_steps.at(size_of(self.vertices[self.mesh.wedges[wedge].vertex].extent));
+            let step = self.color_steps.at(size(self.vertices[self.mesh.wedges[wedge].vertex].extent));
             let truth = side.color(wedge, step);
             let (color, misses) = code_color(side, &mut self.models.colors, &around, step, truth)?;
             self.mesh.wedges[wedge].color = from_grains(color);
