@@ -109,7 +109,8 @@ impl Front {
     #[inline]
     pub(super) fn vertices_from(&self, corner: Corner) -> [VertexId; 3] {
         let rows = self.rows_of(corner);
-        [corner, corner.next(), corner.previous()].map(|corner| rows[corner.place()].vertex())
+        let at = |corner: Corner| rows[corner.place()].vertex();
+        [at(corner), at(corner.next()), at(corner.previous())]
     }
 
     /// The partner of an edge.
@@ -122,7 +123,8 @@ impl Front {
     #[inline]
     fn across_from(&self, edge: Corner) -> [Corner; 3] {
         let rows = self.rows_of(edge);
-        [edge, edge.next(), edge.previous()].map(|edge| rows[edge.place()].across)
+        let across = |edge: Corner| rows[edge.place()].across;
+        [across(edge), across(edge.next()), across(edge.previous())]
     }
 
     #[inline]
@@ -150,7 +152,7 @@ impl Front {
     /// The corner at `vertex` of the youngest face before a gap of [`SHARP`] there, going around it anticlockwise; if the
     /// `scan` youngest have none, of the one before the sharpest: the youngest of equals, and without a gap below 180
     /// degrees the youngest.
-    #[inline]
+    #[inline(always)]
     pub(super) fn find_sharpest(&mut self, vertices: &Vertices, vertex: VertexId, scan: usize) -> Option<Corner> {
         let end = vertices[vertex].open;
         let mut corner = self.rows[end.index()].older;
@@ -172,13 +174,13 @@ impl Front {
     }
 
     /// How sharp the gap between an edge's face and its partner's is.
-    #[inline]
+    #[inline(always)]
     pub(super) fn gap(&mut self, vertices: &Vertices, edge: Corner) -> Sharpness {
         let known = self.rows[edge.index()].gap();
         if known == UNKNOWN { self.measure(vertices, edge) } else { known }
     }
 
-    #[inline(never)]
+    #[inline(always)]
     fn measure(&mut self, vertices: &Vertices, edge: Corner) -> Sharpness {
         let row = self.rows[edge.index()];
         let partner = row.across;

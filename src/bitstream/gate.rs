@@ -43,12 +43,13 @@ pub(super) struct Gate {
 
 impl Gate {
     /// The open face at `focus` to close next. `None`: all faces at `focus` are closed.
-    #[inline]
+    #[inline(always)]
     pub(super) fn choose(front: &mut Front, vertices: &Vertices, focus: VertexId) -> Option<Self> {
         let corner = front.find_sharpest(vertices, focus, SCAN)?;
         let corners = front.vertices_from(corner);
         let edges = [corner.previous(), corner, corner.next()];
-        let across = edges.map(|edge| front.vertex_across(edge));
+        let [first, second, third] = edges;
+        let across = [front.vertex_across(first), front.vertex_across(second), front.vertex_across(third)];
         let [a, b, c] = corners.map(|v| &vertices[v]);
         let extent = extents::around([a.extent, b.extent, c.extent]);
         Some(Self {

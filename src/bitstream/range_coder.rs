@@ -108,8 +108,10 @@ impl SymbolModel {
     /// The symbol at a cumulative probability.
     #[inline]
     fn symbol_at(&self, place: i16) -> usize {
-        let lower: i16 = self.below.iter().map(|&below| i16::from(below <= place)).sum();
-        lower as usize - 1
+        // They rise, so those that are not above it come first.
+        let below = self.below.iter().enumerate();
+        let mask = below.fold(0u32, |mask, (symbol, &below)| mask | u32::from(below <= place) << symbol);
+        mask.trailing_ones() as usize - 1
     }
 
     #[inline]

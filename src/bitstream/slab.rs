@@ -429,10 +429,20 @@ impl Slab {
         };
         side.enter(Part::Labels);
         let before = gate.map(|(_, label)| label);
-        let closed = self.closed_labels(met);
-        let label = self.code_tet_label(side, corners, before, &closed)?;
-        let wedges = self.code_wedges(side, corners, label)?;
-        self.note_neighbours(wedges, label, &[closed[0], closed[1], closed[2], before]);
+        let wedges = match before {
+            Some(0) if self.is_uniform && self.labels == 1 => {
+                let wedges = self.code_wedges(side, corners, 0)?;
+                self.note_spokes(wedges, met);
+                wedges
+            }
+            _ => {
+                let closed = self.closed_labels(met);
+                tet.label = self.code_tet_label(side, corners, before, &closed)?;
+                let wedges = self.code_wedges(side, corners, tet.label)?;
+                self.note_neighbours(wedges, tet.label, &[closed[0], closed[1], closed[2], before]);
+                wedges
+            }
+        };
         self.mesh.tets.push(wedges);
         if self.hops.goes_on(0) {
             self.stars.push(corners);
@@ -443,7 +453,6 @@ impl Slab {
             let vertex = &mut self.vertices[vertex];
             (vertex.extent, vertex.linked) = (extent, vertex.linked.with(links));
         }
-        tet.label = label;
         let gate = match gate {
             Some((gate, _)) => gate,
             None => self.front.sow(&tet),

@@ -67,7 +67,7 @@ impl Front {
     ///
     /// Where the apex lies across edges of the gate, these tell. Across one only, or none, the far ends of the edge that
     /// is new may have it elsewhere on the front: only if the two have had an edge before.
-    #[inline]
+    #[inline(always)]
     pub(in crate::bitstream) fn meet(&self, vertices: &Vertices, corners: [VertexId; 4], gate: Corner) -> Met {
         let [first, second, third, apex] = corners;
         let [at_gate, at_next, at_previous] = self.across_from(gate);
@@ -165,7 +165,7 @@ impl Front {
     ///
     /// # Errors
     /// An open face that is there already.
-    #[inline]
+    #[inline(never)]
     pub(in crate::bitstream) fn cover(&mut self, tet: &NewTet, gate: Corner, met: &Met) -> Result<(), MeshFault> {
         // One of three comes from the gate.
         self.reserve(2);

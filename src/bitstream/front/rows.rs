@@ -128,8 +128,10 @@ pub(super) fn enlist(rows: &mut [Row], corner: Corner, (vertex, end): (VertexId,
 #[inline(always)]
 pub(super) fn unlist(rows: &mut [Row], corner: Corner) -> [Corner; 3] {
     let face = &rows.as_chunks::<4>().0[corner.face()];
-    let across = [corner, corner.next(), corner.previous()].map(|corner| face[corner.place()].across);
-    let [a, b, c] = [0, 1, 2].map(|place| (face[place].older, face[place].younger));
+    let across = |corner: Corner| face[corner.place()].across;
+    let across = [across(corner), across(corner.next()), across(corner.previous())];
+    let links = |place: usize| (face[place].older, face[place].younger);
+    let [a, b, c] = [links(0), links(1), links(2)];
     skip(rows, a);
     skip(rows, b);
     skip(rows, c);
