@@ -100,8 +100,9 @@ impl Front {
         &self.rows.as_chunks().0[corner.face()]
     }
 
+    /// The vertex of a corner; [`NOWHERE`] in a row that has none.
     #[inline]
-    fn vertex(&self, corner: Corner) -> VertexId {
+    pub(super) fn vertex(&self, corner: Corner) -> VertexId {
         self.rows[corner.index()].vertex()
     }
 
@@ -132,10 +133,10 @@ impl Front {
         self.across(edge).is_some()
     }
 
-    /// The vertex across an edge, [`NOWHERE`] without a partner: the corner of its face that is not on the edge.
+    /// The corner across an edge, that of its partner's face that is not on it; a row that has no vertex without a partner.
     #[inline]
-    pub(super) fn vertex_across(&self, edge: Corner) -> VertexId {
-        self.vertex(self.across(edge).previous())
+    pub(super) fn corner_across(&self, edge: Corner) -> Corner {
+        self.across(edge).previous()
     }
 
     /// Corners of open faces at `vertex`, the youngest first.

@@ -29,7 +29,9 @@ pub(super) struct Gate {
     pub(super) corners: [VertexId; 3],
     /// Its edges in the order in which what lies across them is asked for: to the focus, from there, opposite.
     pub(super) edges: [Corner; 3],
-    /// Vertices across them; [`NOWHERE`](super::front::NOWHERE) for none.
+    /// Corners across them; rows of no face for none.
+    pub(super) opposite: [Corner; 3],
+    /// Vertices there; [`NOWHERE`](super::front::NOWHERE) for none.
     pub(super) across: [VertexId; 3],
     /// Sides of the box that all its corners lie on, as bits.
     pub(super) sides: u8,
@@ -46,22 +48,29 @@ impl Gate {
     #[inline(always)]
     pub(super) fn choose(front: &mut Front, vertices: &Vertices, focus: VertexId) -> Option<Self> {
         let corner = front.find_sharpest(vertices, focus, SCAN)?;
+        Some(Self::new(front, vertices, corner))
+    }
+
+    /// The open face of this corner.
+    #[inline(always)]
+    pub(super) fn new(front: &Front, vertices: &Vertices, corner: Corner) -> Self {
         let corners = front.vertices_from(corner);
         let edges = [corner.previous(), corner, corner.next()];
-        let [first, second, third] = edges;
-        let across = [front.vertex_across(first), front.vertex_across(second), front.vertex_across(third)];
+        let opposite = edges.map(|edge| front.corner_across(edge));
+        let across = opposite.map(|corner| front.vertex(corner));
         let [a, b, c] = corners.map(|v| &vertices[v]);
         let extent = extents::around([a.extent, b.extent, c.extent]);
-        Some(Self {
+        Self {
             corner,
             corners,
             edges,
+            opposite,
             across,
             sides: a.sides & b.sides & c.sides,
             extent,
             scale: Vec3A::ONE / extent,
             sum: a.position + b.position + c.position,
-        })
+        }
     }
 
     /// Square of the distance of a vertex from the gate's centre, in extents.

@@ -8,7 +8,7 @@
 
 mod wedges;
 
-use glam::{IVec3, Vec3A};
+use glam::IVec3;
 
 use super::bits::Part;
 use super::colors::{ColorModels, ColorSteps, Grains, KnownColor};
@@ -294,7 +294,7 @@ impl Slab {
         let corners = [a, b, c, apex];
         // A new apex has no open faces.
         let is_known = apex.index() < known;
-        let met = if is_known { self.front.meet(&self.vertices, corners, gate.corner) } else { Met::NOTHING };
+        let met = if is_known { self.front.meet(&self.vertices, gate, apex) } else { Met::NOTHING };
         self.attach(side, corners, &met, Some((gate.corner, before.label)))
     }
 
@@ -327,22 +327,18 @@ impl Slab {
         let truth = side.new_vertex();
         if let Some((position, _)) = truth {
             self.check_inside(position)?;
-            let end = point(position);
-            self.check_positive(gate.corners, position, behind.gate.map(|corner| corner - end))?;
+            let [a, b, c] = gate.corners.map(|v| self.mesh.positions[v.index()]);
+            self.check_positive([a, b, c, position])?;
         }
         let (position, pinned) = truth.unwrap_or_default();
         let position = code_position(side, &mut self.models.positions, &behind, &self.bounds, position)?;
         self.push_vertex(side, position, pinned)
     }
 
-    /// Checks that the next tet is positive: with a gate of these corners and this apex, and the edges between them.
-    #[inline]
-    fn check_positive(&self, gate: [VertexId; 3], apex: IVec3, edges: [Vec3A; 3]) -> Result<(), MeshFault> {
-        if is_positive(edges) {
-            return Ok(());
-        }
-        let [a, b, c] = gate.map(|v| self.mesh.positions[v.index()]);
-        let volume6 = volume6(a, b, c, apex);
+    /// Checks that the next tet, with these corners, is positive.
+    #[cold]
+    fn check_positive(&self, [a, b, c, d]: [IVec3; 4]) -> Result<(), MeshFault> {
+        let volume6 = volume6(a, b, c, d);
         let tet = self.mesh.tets.len() as u32;
         if volume6 > 0 { Ok(()) } else { Err(MeshFault::NotPositive { tet, volume6 }) }
     }
@@ -416,8 +412,10 @@ impl Slab {
         let around = corners.map(|v| &self.vertices[v]);
         let [a, b, c, d] = around.map(|v| v.position);
         let edges = [a - d, b - d, c - d];
-        let [gate_corners @ .., apex] = corners;
-        self.check_positive(gate_corners, self.mesh.positions[apex.index()], edges)?;
+        if !is_positive(edges) {
+            let [a, b, c, d] = corners.map(|v| self.mesh.positions[v.index()]);
+            self.check_positive([a, b, c, d])?;
+        }
         let mut tet = NewTet {
             number: tet,
             label: 0,

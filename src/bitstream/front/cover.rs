@@ -14,6 +14,7 @@ use super::rows::{Row, enlist, pair, pair_as, unlist};
 use super::{Before, Corner, Front, WIDE};
 use crate::bitstream::MeshFault;
 use crate::bitstream::extents;
+use crate::bitstream::gate::Gate;
 use crate::bitstream::normals::{cross, unit_normal};
 use crate::bitstream::vertices::{Linked, Vertices};
 use crate::mesh::VertexId;
@@ -63,23 +64,20 @@ impl Met {
 }
 
 impl Front {
-    /// What a tet behind `gate` (its corner at the first vertex) with a known apex meets.
+    /// What a tet behind a gate with a known apex meets.
     ///
     /// Where the apex lies across edges of the gate, these tell. Across one only, or none, the far ends of the edge that
     /// is new may have it elsewhere on the front: only if the two have had an edge before.
     #[inline(always)]
-    pub(in crate::bitstream) fn meet(&self, vertices: &Vertices, corners: [VertexId; 4], gate: Corner) -> Met {
-        let [first, second, third, apex] = corners;
-        let [at_gate, at_next, at_previous] = self.across_from(gate);
+    pub(in crate::bitstream) fn meet(&self, vertices: &Vertices, gate: &Gate, apex: VertexId) -> Met {
+        let [first, second, third] = gate.corners;
         let mut met = Met::NOTHING;
         let mut count = 0;
         let mut far = apex;
-        for (face, (partner, opposite)) in
-            [(at_next, first), (at_previous, second), (at_gate, third)].into_iter().enumerate()
-        {
-            let corner = partner.previous();
-            let is_closed = partner.is_some() & (self.vertex(corner) == apex);
-            met.closed[face] = if is_closed { corner } else { Corner::NONE };
+        // The order of the gate's edges is another one than that of the tet's faces.
+        for (face, edge, opposite) in [(0, 2, first), (1, 0, second), (2, 1, third)] {
+            let is_closed = gate.across[edge] == apex;
+            met.closed[face] = if is_closed { gate.opposite[edge] } else { Corner::NONE };
             count += u32::from(is_closed);
             far = if is_closed { opposite } else { far };
         }
@@ -90,7 +88,7 @@ impl Front {
             _ => Linked::NOTHING,
         };
         if vertices[far].linked.may_meet(wanted) {
-            self.look_around(vertices, corners, far, &mut met);
+            self.look_around(vertices, [first, second, third, apex], far, &mut met);
         }
         met
     }
@@ -389,7 +387,7 @@ mod tests {
                 edges: [at_a, at_b, at_c].map(|corner| corner - at_apex),
             };
             let (gate, met) = match behind {
-                Some((_, gate)) => (gate, front.meet(&vertices, corners, gate)),
+                Some((corners, gate)) => (gate, front.meet(&vertices, &Gate::new(&front, &vertices, gate), corners[3])),
                 None => (front.sow(&tet), Met::NOTHING),
             };
             for (one, other) in corners.into_iter().flat_map(|one| corners.map(|other| (one, other))) {
