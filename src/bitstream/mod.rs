@@ -16,6 +16,7 @@ mod hops;
 mod index;
 mod labels;
 mod limits;
+mod models;
 mod near;
 mod neighbours;
 mod normals;

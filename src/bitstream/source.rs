@@ -11,7 +11,8 @@ use glam::IVec3;
 
 use super::colors::{Grains, to_grains};
 use super::connectivity::Apex;
-use super::range_coder::{BitCoder, BitModel, RangeEncoder, SymbolModel};
+use super::models::{BitModel, SymbolModel};
+use super::range_coder::{BitCoder, RangeEncoder};
 use super::slab::Side;
 use super::{MeshFault, WriteError};
 use crate::mesh::{MeshError, TetMesh, VertexId, WedgeId};

@@ -2,7 +2,8 @@
 //!
 //! In: integers with the model of their context. Out: the same, coded. Forbidden here: what an integer means.
 
-use super::range_coder::{BitCoder, BitModel, SYMBOLS, SymbolModel};
+use super::models::{BitModel, SYMBOLS, SymbolModel};
+use super::range_coder::BitCoder;
 
 /// Exponents that are coded with a model each; larger ones share the last.
 const EXPONENTS: usize = 20;
