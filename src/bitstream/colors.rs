@@ -6,8 +6,10 @@ use glam::Vec3;
 
 use super::MeshFault;
 use super::bits::Part;
+use super::extents::ilog2;
+use super::normals::floor;
 use super::range_coder::BitCoder;
-use super::symbols::IntModel;
+use super::symbols::{ResidualModel, UintModel};
 
 /// A colour: R, G, B in grains.
 pub(super) type Grains = [i32; 3];
@@ -152,10 +154,14 @@ impl Around {
         self.count == 0
     }
 
+    /// What sums are multiplied with to be means in steps.
+    fn scale(&self, step: i32) -> f32 {
+        1.0 / (self.count.max(1) * i64::from(step)) as f32
+    }
+
     /// The mean in steps, rounded; 0 of nothing.
-    fn prediction(&self, step: i64) -> [i64; 3] {
-        let n = self.count.max(1) * step;
-        self.sum.map(|sum| (2 * sum + n).div_euclid(2 * n))
+    fn prediction(&self, scale: f32) -> [i64; 3] {
+        self.sum.map(|sum| floor(sum as f32 * scale + 0.5).into())
     }
 
     /// The square of the count times the variance of a channel.
@@ -165,11 +171,14 @@ impl Around {
 
     /// Class of how uncertain the prediction is, in steps: how much the wedges around differ, and how badly they were
     /// predicted.
-    fn class(&self, variance: i64, misses: i64, step: i64) -> usize {
+    fn class(&self, variance: i64, misses: i64, scale: f32) -> usize {
         match self.count {
             0 => CLASSES - 2,
             1 => CLASSES - 1,
-            n => ((4 * (variance + misses * misses) / (n * n * step * step) + 1).ilog2() as usize).min(CLASSES - 3),
+            _ => {
+                let spread = (variance + misses * misses) as f32 * (4.0 * scale * scale);
+                (ilog2(spread + 1.0) as usize).min(CLASSES - 3)
+            }
         }
     }
 }
@@ -177,19 +186,19 @@ impl Around {
 /// How one residual follows another: the slope of a line through 0, fitted to the last some thousand.
 #[derive(Debug, Clone, Copy)]
 struct Slope {
-    products: i64,
-    squares: i64,
+    products: i32,
+    squares: i32,
 }
 
 impl Slope {
     const NEW: Self = Self { products: 0, squares: 64 };
 
     fn predict(&self, from: i64) -> i64 {
-        (2 * self.products * from + self.squares).div_euclid(2 * self.squares)
+        floor(self.products as f32 * from as f32 / self.squares as f32 + 0.5).into()
     }
 
     fn learn(&mut self, from: i64, to: i64) {
-        let [from, to] = [from, to].map(|residual| residual.clamp(-LEARNT_MAX, LEARNT_MAX));
+        let [from, to] = [from, to].map(|residual| residual.clamp(-LEARNT_MAX, LEARNT_MAX) as i32);
         self.products += from * to - (self.products >> SLOPE_SHIFT);
         self.squares += from * from - (self.squares >> SLOPE_SHIFT);
     }
@@ -198,9 +207,10 @@ impl Slope {
 /// Models of colour residuals.
 #[derive(Debug, Clone)]
 pub(super) struct ColorModels {
-    green: [IntModel; CLASSES],
-    red: [[IntModel; GREEN_CLASSES]; CLASSES],
-    blue: [[IntModel; GREEN_CLASSES]; CLASSES],
+    green: [ResidualModel; CLASSES],
+    red: [[ResidualModel; GREEN_CLASSES]; CLASSES],
+    blue: [[ResidualModel; GREEN_CLASSES]; CLASSES],
+    escape: UintModel,
     red_of_green: Slope,
     blue_of_green: Slope,
     blue_of_red: Slope,
@@ -208,9 +218,10 @@ pub(super) struct ColorModels {
 
 impl ColorModels {
     pub(super) const NEW: Self = Self {
-        green: [const { IntModel::NEW }; CLASSES],
-        red: [const { [const { IntModel::NEW }; GREEN_CLASSES] }; CLASSES],
-        blue: [const { [const { IntModel::NEW }; GREEN_CLASSES] }; CLASSES],
+        green: [const { ResidualModel::NEW }; CLASSES],
+        red: [const { [const { ResidualModel::NEW }; GREEN_CLASSES] }; CLASSES],
+        blue: [const { [const { ResidualModel::NEW }; GREEN_CLASSES] }; CLASSES],
+        escape: UintModel::NEW,
         red_of_green: Slope::NEW,
         blue_of_green: Slope::NEW,
         blue_of_red: Slope::NEW,
@@ -231,23 +242,29 @@ pub(super) fn code_color(
     step: i32,
     truth: Grains,
 ) -> Result<(Grains, Misses), MeshFault> {
+    let scale = around.scale(step);
     let step = i64::from(step);
-    let predicted = around.prediction(step);
+    let predicted = around.prediction(scale);
     let truth = to_channels(truth).map(|channel| channel / step);
     let residual = [0, 1, 2].map(|channel| truth[channel] - predicted[channel]);
     let [luma, chroma] = [(around.variance(0), 0), (around.variance(1) + around.variance(2), 1)]
-        .map(|(v, m)| around.class(v, around.misses[m], step));
+        .map(|(v, m)| around.class(v, around.misses[m], scale));
 
     coder.enter(Part::Luma);
-    let green = code_residual(coder, &mut models.green[luma], residual[0]);
+    let green = code_residual(coder, &mut models.escape, &mut models.green[luma], residual[0]);
     coder.enter(Part::Chroma);
     let context = (green.unsigned_abs().min(7) + 1).ilog2() as usize;
     let along = models.red_of_green.predict(green);
-    let red = code_residual(coder, &mut models.red[chroma][context], residual[1] - along);
+    let red = code_residual(coder, &mut models.escape, &mut models.red[chroma][context], residual[1] - along);
     models.red_of_green.learn(green, along + red);
     let along_red = models.blue_of_red.predict(red);
     let along_green = models.blue_of_green.predict(green);
-    let blue = code_residual(coder, &mut models.blue[chroma][context], residual[2] - along_green - along_red);
+    let blue = code_residual(
+        coder,
+        &mut models.escape,
+        &mut models.blue[chroma][context],
+        residual[2] - along_green - along_red,
+    );
     models.blue_of_green.learn(green, along_green + along_red + blue);
     models.blue_of_red.learn(red, along_red + blue);
 
@@ -263,9 +280,10 @@ pub(super) fn code_color(
 }
 
 /// Codes a residual; the parser's `truth` is not looked at, and may be anything.
-fn code_residual(coder: &mut impl BitCoder, model: &mut IntModel, truth: i64) -> i64 {
+#[inline]
+fn code_residual(coder: &mut impl BitCoder, escape: &mut UintModel, model: &mut ResidualModel, truth: i64) -> i64 {
     const LIMIT: i64 = 1 << 24;
-    model.code(coder, truth.clamp(-LIMIT, LIMIT) as i32).into()
+    model.code(escape, coder, truth.clamp(-LIMIT, LIMIT) as i32)
 }
 
 #[cfg(all(test, feature = "encode"))]

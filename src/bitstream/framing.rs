@@ -13,7 +13,7 @@ use super::header::MAX_HEADER_BYTES;
 use super::{Limits, ParseError, SequenceHeader};
 
 /// Version of the format, the last byte of [`MAGIC`].
-pub const VERSION: u8 = 4;
+pub const VERSION: u8 = 5;
 
 /// First bytes of a keyframe packet, and so of a file. The first byte is no ASCII and the line end would not survive a
 /// transfer as text, as in PNG.
@@ -33,6 +33,11 @@ const FLAG_INDEX: u8 = 4;
 const FIELD_BYTES: usize = 15;
 /// Bytes of the CRC at a packet's end.
 pub(super) const CRC_BYTES: usize = 4;
+
+/// First bytes of lengths that have two or four more.
+const LONG: u8 = 251;
+/// See [`LONG`].
+const LONGER: u8 = 252;
 
 /// What stands before a packet's body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,6 +89,43 @@ pub(super) fn write_packet(mut header: PacketHeader, body: &[u8]) -> Option<Vec<
     data.extend_from_slice(body);
     data.extend_from_slice(&crc32fast::hash(&data).to_le_bytes());
     Some(data)
+}
+
+/// Appends a payload: the length of its raw bits in the variable-length code of the sequence header, these, then the coded
+/// bytes.
+#[cfg(feature = "encode")]
+pub(super) fn write_payload(body: &mut Vec<u8>, [coded, raw]: &[Vec<u8>; 2]) {
+    let length = raw.len() as u32;
+    match (u8::try_from(length).ok().filter(|&byte| byte < LONG), u16::try_from(length)) {
+        (Some(byte), _) => body.push(byte),
+        (None, Ok(word)) => {
+            body.push(LONG);
+            body.extend_from_slice(&word.to_le_bytes());
+        }
+        (None, Err(_)) => {
+            body.push(LONGER);
+            body.extend_from_slice(&length.to_le_bytes());
+        }
+    }
+    body.extend_from_slice(raw);
+    body.extend_from_slice(coded);
+}
+
+/// The coded bytes of a payload, and those of its raw bits.
+///
+/// # Errors
+/// A payload that ends before its raw bits do.
+pub(super) fn parse_payload(payload: &[u8]) -> Result<[&[u8]; 2], ParseError> {
+    let (length, start) = match *payload {
+        [byte, ..] if byte < LONG => (usize::from(byte), 1),
+        [LONG, low, high, ..] => (usize::from(u16::from_le_bytes([low, high])), 3),
+        [LONGER, a, b, c, d, ..] => (u32::from_le_bytes([a, b, c, d]) as usize, 5),
+        _ => (1, payload.len()),
+    };
+    let parts = payload[start..].split_at_checked(length);
+    let cut_off =
+        || ParseError::Length { field: "raw bits", expected: start.saturating_add(length), found: payload.len() };
+    parts.map(|(raw, coded)| [coded, raw]).ok_or_else(cut_off)
 }
 
 /// Parses the packet header at the start of `bytes`; `None` if it is cut off and more bytes are needed. The CRC is not

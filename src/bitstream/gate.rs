@@ -6,10 +6,11 @@
 //! at the focus come first. Meshes are long in time where nothing moves, so angles and distances are measured in the
 //! extents of the edges around.
 
-use glam::{I64Vec3, IVec3, Vec3};
+use glam::Vec3A;
 
-use super::extents::{self, PARTS};
+use super::extents;
 use super::front::{Corner, Front};
+use super::normals::dot;
 use super::vertices::Vertices;
 use crate::mesh::VertexId;
 
@@ -26,33 +27,57 @@ pub(super) struct Gate {
     pub(super) corner: Corner,
     /// Its vertices, the focus first.
     pub(super) corners: [VertexId; 3],
-    /// Sum of the extents at its corners.
-    pub(super) extent: IVec3,
     /// Its edges in the order in which what lies across them is asked for: to the focus, from there, opposite.
     pub(super) edges: [Corner; 3],
-    /// Vertices across them; [`NOWHERE`](super::front::NOWHERE) for none.
+    /// Corners across them; rows of no face for none.
+    pub(super) opposite: [Corner; 3],
+    /// Vertices there; [`NOWHERE`](super::front::NOWHERE) for none.
     pub(super) across: [VertexId; 3],
+    /// Sides of the box that all its corners lie on, as bits.
+    pub(super) sides: u8,
+    /// Sum of the extents at its corners.
+    pub(super) extent: Vec3A,
+    /// The inverse of each component.
+    scale: Vec3A,
     /// Sum of the corners' positions.
-    sum: IVec3,
+    sum: Vec3A,
 }
 
 impl Gate {
     /// The open face at `focus` to close next. `None`: all faces at `focus` are closed.
-    #[inline]
+    #[inline(always)]
     pub(super) fn choose(front: &mut Front, vertices: &Vertices, focus: VertexId) -> Option<Self> {
         let corner = front.find_sharpest(vertices, focus, SCAN)?;
+        Some(Self::new(front, vertices, corner))
+    }
+
+    /// The open face of this corner.
+    #[inline(always)]
+    pub(super) fn new(front: &Front, vertices: &Vertices, corner: Corner) -> Self {
         let corners = front.vertices_from(corner);
-        let [a, b, c] = corners.map(|v| vertices.position(v));
         let edges = [corner.previous(), corner, corner.next()];
-        let across = edges.map(|edge| front.vertex_across(edge));
-        Some(Self { corner, corners, extent: extents::around(vertices, corners), edges, across, sum: a + b + c })
+        let opposite = edges.map(|edge| front.corner_across(edge));
+        let across = opposite.map(|corner| front.vertex(corner));
+        let [a, b, c] = corners.map(|v| &vertices[v]);
+        let extent = extents::around([a.extent, b.extent, c.extent]);
+        Self {
+            corner,
+            corners,
+            edges,
+            opposite,
+            across,
+            sides: a.sides & b.sides & c.sides,
+            extent,
+            scale: Vec3A::ONE / extent,
+            sum: a.position + b.position + c.position,
+        }
     }
 
     /// Square of the distance of a vertex from the gate's centre, in extents.
     #[inline]
     pub(super) fn distance2(&self, vertices: &Vertices, vertex: VertexId) -> f32 {
-        let d = (3 * vertices.position(vertex) - self.sum).as_vec3() / self.extent.as_vec3();
-        (PARTS * PARTS) as f32 * (d.x * d.x + d.y * d.y + d.z * d.z)
+        let d = (3.0 * vertices.position(vertex) - self.sum) * self.scale;
+        dot(d, d)
     }
 
     /// Class of that distance.
@@ -63,18 +88,4 @@ impl Gate {
         const ONE: u32 = 1.0f32.to_bits() >> 22;
         (half_octaves + 1).saturating_sub(ONE).min(RANGES as u32 - 1) as usize
     }
-}
-
-/// What the plane of (a, b, c) is perpendicular to, in lattice units, exact; the same for each corner that comes first.
-#[inline]
-pub(super) fn plane([a, b, c]: [IVec3; 3]) -> I64Vec3 {
-    (b - a).as_i64vec3().cross((c - a).as_i64vec3())
-}
-
-/// Unit normal of a plane, not 0, where each axis is measured in extents. Every operation is one of IEEE 754's correctly
-/// rounded ones, so all machines agree on it.
-#[inline(always)]
-pub(super) fn unit_normal(plane: I64Vec3, extent: IVec3) -> Vec3 {
-    let n = plane.as_vec3() * extent.as_vec3();
-    n / (n.x * n.x + n.y * n.y + n.z * n.z).sqrt()
 }

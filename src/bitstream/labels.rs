@@ -4,7 +4,8 @@
 //! the stream names them. Forbidden here: geometry, colours.
 
 use super::MeshFault;
-use super::range_coder::{BitCoder, BitModel};
+use super::models::BitModel;
+use super::range_coder::BitCoder;
 use super::symbols::UintModel;
 
 /// Places among the candidates that have a model of their own.

@@ -3,25 +3,25 @@
 //! In: the front, a gate. Out: vertices, the most likely first. Forbidden here: coding.
 
 use super::front::Front;
-use super::gate::{Gate, SCAN, plane};
+use super::gate::{Gate, SCAN};
+use super::normals::{cross, dot};
 use super::vertices::Vertices;
 use crate::mesh::VertexId;
 
 /// Finds the rings around gates. Kept from gate to gate for its memory.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rings {
-    /// Per vertex the last search that met it.
-    met: Vec<u32>,
-    search: u32,
-    /// Vertices of the ring, and of the one before.
+    near: Vec<Place>,
+    far: Vec<Place>,
+    /// Neighbours of the gate's corners, whether near or not.
     ring: Vec<VertexId>,
-    inner: Vec<VertexId>,
-    /// Those of the ring by distance: its bits, which order what is not negative just so, then the vertex.
-    places: Vec<u64>,
 }
 
+/// A vertex by its distance from a gate: the bits of that, which order what is not negative just so, then the vertex.
+type Place = u64;
+
 impl Rings {
-    /// Near vertices: other corners of the open faces at the gate's corners. They are ranked without those `asked`.
+    /// Near vertices: neighbours of the gate's corners. They are ranked without those `asked`.
     pub(super) fn near(
         &mut self,
         front: &Front,
@@ -29,67 +29,83 @@ impl Rings {
         gate: &Gate,
         asked: [VertexId; 3],
     ) -> Ranking<'_> {
-        self.find_near(front, vertices, gate);
-        self.rank(vertices, gate, asked)
+        self.near.clear();
+        find_around(&gate.corners, (front, vertices), gate, asked, &mut self.near);
+        Ranking { places: &self.near, others: &[], last: 0 }
     }
 
-    /// Far vertices: the same one ring farther, without those of the first.
+    /// Far vertices: neighbours of the near ones that are not near.
     pub(super) fn far(&mut self, front: &Front, vertices: &Vertices, gate: &Gate, asked: [VertexId; 3]) -> Ranking<'_> {
-        self.find_near(front, vertices, gate);
-        std::mem::swap(&mut self.ring, &mut self.inner);
-        self.find_ring(front, vertices);
-        self.rank(vertices, gate, asked)
-    }
-
-    fn find_near(&mut self, front: &Front, vertices: &Vertices, gate: &Gate) {
-        self.met.resize(vertices.len(), 0);
-        self.search += 1;
-        self.inner.clear();
-        self.inner.extend(gate.corners);
-        self.find_ring(front, vertices);
-    }
-
-    /// Other corners of the youngest open faces around the inner vertices that this search has not met yet.
-    fn find_ring(&mut self, front: &Front, vertices: &Vertices) {
+        self.near(front, vertices, gate, asked);
+        self.near.sort_unstable();
         self.ring.clear();
-        for &vertex in &self.inner {
-            for corner in front.at(vertices, vertex).take(SCAN) {
-                let [_, second, third] = front.vertices_from(corner);
-                for other in [second, third] {
-                    let met = &mut self.met[other.index()];
-                    if *met != self.search {
-                        *met = self.search;
-                        self.ring.push(other);
-                    }
-                }
-            }
+        for vertex in gate.corners {
+            for_each_neighbour(front, vertices, vertex, |other| self.ring.push(other));
         }
+        self.ring.sort_unstable();
+        self.ring.dedup();
+        self.far.clear();
+        find_around(&self.ring, (front, vertices), gate, asked, &mut self.far);
+        Ranking { places: &self.far, others: &self.near, last: 0 }
     }
+}
 
-    fn rank(&mut self, vertices: &Vertices, gate: &Gate, asked: [VertexId; 3]) -> Ranking<'_> {
-        let [a, b, c] = gate.corners.map(|v| vertices.position(v));
-        let plane = plane([a, b, c]);
-        let is_positive = |v: VertexId| plane.dot((vertices.position(v) - a).as_i64vec3()) > 0;
-        let place = |v: VertexId| u64::from(gate.distance2(vertices, v).to_bits()) << 32 | u64::from(v.0);
-        let found = self.ring.iter().copied().filter(|&v| is_positive(v) && !asked.contains(&v));
-        self.places.clear();
-        self.places.extend(found.map(place));
-        Ranking { places: &mut self.places }
+fn vertex(place: Place) -> VertexId {
+    VertexId(place as u32)
+}
+
+/// Takes note of the neighbours of some vertices that make a positive tet with the gate, as often as they are met.
+fn find_around(
+    around: &[VertexId],
+    (front, vertices): (&Front, &Vertices),
+    gate: &Gate,
+    asked: [VertexId; 3],
+    found: &mut Vec<Place>,
+) {
+    let [a, b, c] = gate.corners.map(|v| vertices.position(v));
+    let plane = cross(b - a, c - a);
+    let mut take_note = |vertex: VertexId| {
+        let is_positive = dot(plane, vertices.position(vertex) - a) > 0.0;
+        if is_positive & !asked.contains(&vertex) & !gate.corners.contains(&vertex) {
+            found.push(u64::from(gate.distance2(vertices, vertex).to_bits()) << 32 | u64::from(vertex.0));
+        }
+    };
+    for &vertex in around {
+        for_each_neighbour(front, vertices, vertex, &mut take_note);
+    }
+}
+
+/// Other corners of the youngest open faces at a vertex: the second one of each, and the third where there is no partner
+/// whose second it is.
+fn for_each_neighbour(front: &Front, vertices: &Vertices, vertex: VertexId, mut take_note: impl FnMut(VertexId)) {
+    for corner in front.at(vertices, vertex).take(SCAN) {
+        let [_, second, third] = front.vertices_from(corner);
+        take_note(second);
+        if !front.has_partner(corner.previous()) {
+            take_note(third);
+        }
     }
 }
 
 /// Vertices in the order of their distance from a gate, then of their ids; only those that could be its apex. They are not
 /// sorted: it is the first of them nearly always.
 pub(super) struct Ranking<'a> {
-    places: &'a mut Vec<u64>,
+    places: &'a [Place],
+    /// Those left out, sorted.
+    others: &'a [Place],
+    /// The last one found.
+    last: Place,
 }
 
 impl Iterator for Ranking<'_> {
     type Item = VertexId;
 
     fn next(&mut self) -> Option<VertexId> {
-        let (place, &nearest) = self.places.iter().enumerate().min_by_key(|&(_, nearest)| nearest)?;
-        self.places.swap_remove(place);
-        Some(VertexId(nearest as u32))
+        loop {
+            self.last = self.places.iter().copied().filter(|&place| place > self.last).min()?;
+            if self.others.binary_search(&self.last).is_err() {
+                return Some(vertex(self.last));
+            }
+        }
     }
 }

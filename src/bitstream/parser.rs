@@ -8,10 +8,11 @@ use glam::IVec3;
 use super::bits::Tally;
 use super::colors::{ColorSteps, Grains};
 use super::connectivity::Apex;
-use super::framing::{PacketHeader, parse_packet, read_u16, read_u32};
+use super::framing::{PacketHeader, parse_packet, parse_payload, read_u16, read_u32};
 use super::header::check_field;
 use super::hops::rings;
-use super::range_coder::{BitCoder, BitModel, RangeDecoder};
+use super::models::{BitModel, SymbolModel};
+use super::range_coder::{BitCoder, RangeDecoder};
 use super::slab::{Side, Slab, SlabParams};
 use super::{BitCounts, Limits, MeshFault, ParseError, Part, SequenceHeader};
 use crate::mesh::{Domain, TetMesh, VertexId};
@@ -238,7 +239,7 @@ impl OpenSlab {
             let limit = self.header.max_duration(limits).into();
             return Err(ParseError::TooLarge { field: "frames in a slab", limit, found: u64::from(self.packets) + 1 });
         }
-        let mut side = Parsing { decoder: RangeDecoder::new(payload), tally: counts.map(Tally::new) };
+        let mut side = Parsing { decoder: RangeDecoder::new(parse_payload(payload)?), tally: counts.map(Tally::new) };
         self.slab.code_packet(&mut side, if packet.last { u32::MAX } else { self.packets + 1 })?;
         side.enter(Part::Connectivity);
         let unread = side.decoder.unread();
@@ -265,6 +266,12 @@ impl BitCoder for Parsing<'_> {
         self.decoder.bit(model, bit)
     }
 
+    #[inline]
+    fn symbol(&mut self, model: &mut SymbolModel, symbol: usize) -> usize {
+        self.decoder.symbol(model, symbol)
+    }
+
+    #[inline]
     fn raw(&mut self, count: u32, value: u32) -> u32 {
         self.decoder.raw(count, value)
     }
@@ -296,6 +303,10 @@ impl Side for Parsing<'_> {
     fn vertex_coded(&mut self, _: VertexId) {}
 
     fn is_uniform(&self) -> bool {
+        false
+    }
+
+    fn has_pins(&self) -> bool {
         false
     }
 

@@ -2,20 +2,23 @@
 //!
 //! In: a position, and the gate that it lies behind. Out: the same, coded. Forbidden here: which tets use it.
 
-use glam::IVec3;
+use glam::{IVec3, Vec3A};
 
 use super::MeshFault;
 use super::bits::Part;
-use super::extents::PARTS;
-use super::gate::{plane, unit_normal};
+use super::extents::ilog2;
 use super::header::MAX_EXTENT;
-use super::range_coder::{BitCoder, BitModel};
-use super::symbols::{IntModel, UintModel};
+use super::models::BitModel;
+use super::normals::{floor, unit_normal, whole};
+use super::range_coder::BitCoder;
+use super::symbols::{SignedModel, SmallModel, UintModel};
 use super::vertices::TOP;
 use crate::mesh::Domain;
 
 /// Classes of a length: the binary logarithm of its square, which is below 2^38.
 const SCALES: usize = 40;
+/// Classes of lengths in x and y that have models of their own.
+const SHORT_SCALES: usize = 8;
 /// How near the prediction is to a side: beyond it, within an extent, farther.
 const NEARNESS: usize = 3;
 /// Classes of how far behind the gate's plane the vertex is expected, in quarters of an extent.
@@ -24,13 +27,13 @@ const HEIGHTS: usize = 5;
 /// How far ahead of the gate's centre a vertex is expected, in extents along the normal.
 const AHEAD: f32 = 0.625;
 /// Weights, in sixteenths, of the vertices across the gate's edges, relative to the gate's centre.
-const ACROSS: [i32; 3] = [4, 2, 1];
+const ACROSS: [f32; 3] = [4.0, 2.0, 1.0];
 /// The same of the gate's first and second corner and of the fourth corner of the tet before it.
-const FIRST: i32 = -3;
+const FIRST: f32 = -3.0;
 /// See [`FIRST`].
-const SECOND: i32 = 6;
+const SECOND: f32 = 6.0;
 /// See [`FIRST`].
-const OPPOSITE: i32 = -1;
+const OPPOSITE: f32 = -1.0;
 
 /// Models of one axis.
 #[derive(Debug, Clone)]
@@ -38,16 +41,18 @@ struct AxisModels {
     /// Whether the vertex lies on the low and on the high side, by number of gate corners there and nearness.
     on_side: [[[BitModel; NEARNESS]; 4]; 2],
     /// Residual of one of the first two coordinates, by scale.
-    free: [IntModel; SCALES],
+    free: [SignedModel; SCALES],
     /// Distance beyond the gate's plane, by scale and expectation.
-    height: [[UintModel; HEIGHTS]; SCALES],
+    height: [[SmallModel; HEIGHTS]; SCALES],
+    escape: UintModel,
 }
 
 impl AxisModels {
     const NEW: Self = Self {
         on_side: [[[BitModel::NEW; NEARNESS]; 4]; 2],
-        free: [const { IntModel::NEW }; SCALES],
-        height: [const { [const { UintModel::NEW }; HEIGHTS] }; SCALES],
+        free: [const { SignedModel::NEW }; SCALES],
+        height: [const { [const { SmallModel::NEW }; HEIGHTS] }; SCALES],
+        escape: UintModel::NEW,
     };
 }
 
@@ -72,13 +77,13 @@ impl PositionModels {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Behind {
     /// Positions of the gate's corners, the focus first.
-    pub(super) gate: [IVec3; 3],
+    pub(super) gate: [Vec3A; 3],
     /// Position of the fourth corner of the tet before the gate.
-    pub(super) opposite: IVec3,
+    pub(super) opposite: Vec3A,
     /// Positions of the vertices across the gate's edges.
-    pub(super) across: [Option<IVec3>; 3],
-    /// Sum of the extents at the gate's corners, in 1/16 lattice units.
-    pub(super) extent: IVec3,
+    pub(super) across: [Option<Vec3A>; 3],
+    /// Sum of the extents at the gate's corners.
+    pub(super) extent: Vec3A,
 }
 
 /// The part of space that is known of.
@@ -130,23 +135,22 @@ struct Expectation {
 impl Expectation {
     fn new(behind: &Behind) -> Self {
         let [a, b, c] = behind.gate;
-        let plane = plane(behind.gate);
-        let extent = behind.extent.as_vec3() / (3 * PARTS) as f32;
-        let normal = unit_normal(plane, behind.extent);
+        let origin = whole(a);
+        let plane = (whole(b) - origin).as_i64vec3().cross((whole(c) - origin).as_i64vec3());
+        let normal = unit_normal(plane.as_vec3a(), behind.extent);
+        let extent = behind.extent / 3.0;
         let sum = a + b + c;
-        let mut ahead = 3 * (SECOND * b + FIRST * a + OPPOSITE * behind.opposite) - (SECOND + FIRST + OPPOSITE) * sum;
+        let mut ahead = 3.0 * (SECOND * b + FIRST * a + OPPOSITE * behind.opposite) - (SECOND + FIRST + OPPOSITE) * sum;
         for (weight, across) in ACROSS.into_iter().zip(behind.across) {
-            ahead += across.map_or(IVec3::ZERO, |p| weight * (3 * p - sum));
+            ahead += across.map_or(Vec3A::ZERO, |p| weight * (3.0 * p - sum));
         }
+        let center = sum / 3.0 + ahead / 48.0;
+        let predicted = (center + AHEAD * extent * normal + 0.5).to_array().map(floor);
         let (extent, normal) = (extent.to_array(), normal.to_array());
-        let predicted = [0, 1, 2].map(|axis| {
-            let center = sum[axis] as f32 / 3.0 + ahead[axis] as f32 / 48.0;
-            (center + AHEAD * extent[axis] * normal[axis] + 0.5).floor() as i32
-        });
         // The first of equals.
         let steeper = |best: usize, axis: usize| if normal[axis].abs() > normal[best].abs() { axis } else { best };
         let last = steeper(steeper(0, 1), 2);
-        Self { extent, normal, predicted, plane: plane.to_array(), origin: a, last }
+        Self { extent, normal, predicted, plane: plane.to_array(), origin, last }
     }
 
     /// Coordinates in the order in which they are coded.
@@ -174,7 +178,13 @@ impl Expectation {
 
 /// Class of a length in lattice units.
 fn scale_class(length: f32) -> usize {
-    (((length * length).max(1.0) as u64).ilog2() as usize).min(SCALES - 1)
+    (ilog2((length * length).max(1.0)) as usize).min(SCALES - 1)
+}
+
+/// Which models a scale has. Lengths in x and y that differ by octaves differ in their raw digits alone, but for the shortest
+/// ones; in time frames show.
+fn context(axis: usize, class: usize) -> usize {
+    if axis < 2 && class >= SHORT_SCALES { SHORT_SCALES + class % 2 } else { class }
 }
 
 /// Binary digits at the end of a number of this scale that are as good as random: all below half of the length.
@@ -216,9 +226,9 @@ pub(super) fn code_position(
             let predicted = expectation.predicted[axis];
             let rest = truth[axis].wrapping_sub(predicted);
             let digits = low_digits(class);
-            let high = models.free[class].code(coder, rest >> digits);
+            let high = models.free[context(axis, class)].code(&mut models.escape, coder, rest >> digits);
             let low = coder.raw(digits, rest as u32 & ((1 << digits) - 1));
-            i64::from(predicted) + (i64::from(high) << digits) + i64::from(low)
+            i64::from(predicted) + (high << digits) + i64::from(low)
         };
         if !(0..=i64::from(far[axis])).contains(&coordinate) {
             return Err(MeshFault::Range { field: "coordinate", low: 0, high: far[axis].into(), found: coordinate });
@@ -243,7 +253,11 @@ fn code_side(
         let beyond = if side == 0 { i64::from(predicted) } else { i64::from(place) - i64::from(predicted) };
         let is_far = beyond as f32 > expectation.extent[axis];
         let nearness = if beyond <= 0 { 0 } else { 1 + usize::from(is_far) };
-        let corners = behind.gate.iter().filter(|p| p[axis] == place).count();
+        let corners = behind.gate.iter().filter(|p| p[axis] == place as f32).count();
+        // Where it is not expected there, no decision is spent on it: it comes as any other coordinate does.
+        if corners == 0 && nearness == NEARNESS - 1 {
+            continue;
+        }
         if coder.bit(&mut models.on_side[side][corners][nearness], truth == place) {
             return Some(place);
         }
@@ -266,9 +280,9 @@ fn code_height(
     let height = ((i64::from(truth) - nearest) * direction).clamp(0, MAX_EXTENT.into()) as u32;
     let scale = scale_class(scale);
     let digits = low_digits(scale);
-    let high = models.height[scale][class].code(coder, height >> digits);
+    let high = models.height[context(axis, scale)][class].code(&mut models.escape, coder, height >> digits);
     let low = coder.raw(digits, height & ((1 << digits) - 1));
-    nearest + direction * ((i64::from(high) << digits) + i64::from(low))
+    nearest + direction * ((high << digits) + i64::from(low))
 }
 
 /// Codes a position as plain numbers, for the corners of a seed.

@@ -1,59 +1,14 @@
-//! Adaptive binary range coding: the one place where decisions become bytes.
+//! Adaptive range coding: the one place where decisions and symbols become bytes.
 //!
-//! In: decisions, each with the model of its context. Out: bytes, and back. Forbidden here: what a decision means.
+//! In: decisions and symbols, each with the model of its context; raw bits. Out: bytes, and back. Forbidden here: what they
+//! mean.
 //!
 //! The interval arithmetic is Martin's range coder in the carry-propagating form that LZMA made common (32-bit range,
-//! renormalised bytewise above 2^24). A library's multi-symbol coder was weighed against it: here every decision is
-//! binary and adapts at once, which needs no division and no cumulative table, and a packet of few bytes pays for one
-//! or two bytes of flushing instead of a 32-bit word or two.
+//! renormalised bytewise above 2^24). Raw bits are as likely 0 as 1, so no interval is narrowed for them: they follow the
+//! coded bytes as they are.
 
 use super::bits::Part;
-
-/// The probability that a decision is 1, learnt from the decisions coded before in the same context.
-///
-/// The mean of the decisions so far, then an exponential average of the last ones.
-///
-/// Both in one word, as models are what the caches of a coder are full of: P(1) in 2^-22 above, and below, in
-/// [`SEEN_BITS`], the number of decisions so far, at most [`SEEN_MAX`].
-#[derive(Debug, Clone, Copy)]
-pub(super) struct BitModel(u32);
-
-/// Binary digits of an average.
-const AVERAGE_BITS: u32 = 22;
-/// Decisions after which a model no longer learns more slowly.
-const SEEN_MAX: u32 = (1 << SEEN_BITS) - 1;
-const SEEN_BITS: u32 = 8;
-
-/// What part of the way to the next decision the average of n decisions moves, in 1/65536: 1 / (n + 1.5).
-const RATES: [u32; SEEN_MAX as usize + 1] = {
-    let mut rates = [0; SEEN_MAX as usize + 1];
-    let mut n = 0;
-    while n < rates.len() {
-        rates[n] = (2 << 16) / (2 * n as u32 + 3);
-        n += 1;
-    }
-    rates
-};
-
-impl BitModel {
-    /// A model that expects nothing.
-    pub(super) const NEW: Self = Self(1 << (AVERAGE_BITS - 1 + SEEN_BITS));
-
-    /// P(1) in 1/65536. It never comes to 0 or 1: averages no longer move when a step would be less than their last digit.
-    #[inline]
-    fn probability(self) -> u32 {
-        self.0 >> (SEEN_BITS + AVERAGE_BITS - 16)
-    }
-
-    #[inline]
-    fn update(&mut self, bit: bool) {
-        let (average, seen) = (self.0 >> SEEN_BITS, self.0 & SEEN_MAX);
-        let rate = u64::from(RATES[seen as usize]);
-        let part = |distance: u32| ((u64::from(distance) * rate) >> 16) as u32;
-        let average = if bit { average + part((1 << AVERAGE_BITS) - average) } else { average - part(average) };
-        self.0 = average << SEEN_BITS | (seen + 1).min(SEEN_MAX);
-    }
-}
+use super::models::{BitModel, CUMULATIVE_BITS, SymbolModel};
 
 /// The range stays at or above this between decisions.
 #[cfg(feature = "encode")]
@@ -65,7 +20,10 @@ pub(super) trait BitCoder {
     /// Codes one decision in the context of `model`, and updates it.
     fn bit(&mut self, model: &mut BitModel, bit: bool) -> bool;
 
-    /// Codes the low `count` (at most 32) bits of `value`, each as likely 0 as 1, the highest first.
+    /// Codes one symbol, less than [`SYMBOLS`], in the context of `model`, and updates it.
+    fn symbol(&mut self, model: &mut SymbolModel, symbol: usize) -> usize;
+
+    /// Codes the low `count` (at most 32) bits of `value`, each as likely 0 as 1.
     fn raw(&mut self, count: u32, value: u32) -> u32;
 
     /// What is coded from here on belongs to this part of the mesh.
@@ -83,12 +41,43 @@ pub(super) struct RangeEncoder {
     waiting: Option<u8>,
     waiting_ff: usize,
     bytes: Vec<u8>,
+    raw: RawWriter,
+}
+
+/// Raw bits on their way to bytes, from the lowest bit of each byte on.
+#[cfg(feature = "encode")]
+#[derive(Debug, Default)]
+struct RawWriter {
+    bytes: Vec<u8>,
+    /// Bits that make no whole byte yet, and how many.
+    waiting: u64,
+    count: u32,
+}
+
+#[cfg(feature = "encode")]
+impl RawWriter {
+    fn push(&mut self, count: u32, value: u32) {
+        self.waiting |= (u64::from(value) & ((1 << count) - 1)) << self.count;
+        self.count += count;
+        while self.count >= u8::BITS {
+            self.bytes.push(self.waiting as u8);
+            self.waiting >>= u8::BITS;
+            self.count -= u8::BITS;
+        }
+    }
+
+    fn finish(mut self) -> Vec<u8> {
+        if self.count > 0 {
+            self.bytes.push(self.waiting as u8);
+        }
+        self.bytes
+    }
 }
 
 #[cfg(feature = "encode")]
 impl RangeEncoder {
     pub(super) fn new() -> Self {
-        Self { low: 0, range: u32::MAX, waiting: None, waiting_ff: 0, bytes: Vec::new() }
+        Self { low: 0, range: u32::MAX, waiting: None, waiting_ff: 0, bytes: Vec::new(), raw: RawWriter::default() }
     }
 
     /// Moves the top byte of `low` out, behind the bytes that a carry can still change.
@@ -114,8 +103,9 @@ impl RangeEncoder {
         }
     }
 
-    /// The bytes of all decisions: of the final interval the number with the most zeros at its end, those left out.
-    pub(super) fn finish(mut self) -> Vec<u8> {
+    /// The bytes of all decisions and symbols, and those of the raw bits. Of the final interval the first ones are the number
+    /// with the most zeros at its end, those left out.
+    pub(super) fn finish(mut self) -> [Vec<u8>; 2] {
         let high = self.low + u64::from(self.range) - 1;
         for mask in [0xff_ffff, 0xffff, 0xff, 0] {
             let rounded = (self.low + mask) & !mask;
@@ -131,7 +121,7 @@ impl RangeEncoder {
         while self.bytes.len() > kept && self.bytes.last() == Some(&0) {
             self.bytes.pop();
         }
-        self.bytes
+        [self.bytes, self.raw.finish()]
     }
 }
 
@@ -151,19 +141,23 @@ impl BitCoder for RangeEncoder {
         bit
     }
 
-    fn raw(&mut self, count: u32, value: u32) -> u32 {
-        if count > RAW_BITS {
-            let high = self.raw(count - RAW_BITS, value >> RAW_BITS);
-            return high << RAW_BITS | self.raw(RAW_BITS, value & ((1 << RAW_BITS) - 1));
-        }
-        self.range >>= count;
-        self.low += u64::from(self.range) * u64::from(value);
+    fn symbol(&mut self, model: &mut SymbolModel, symbol: usize) -> usize {
+        let [low, high] = model.bounds(symbol);
+        self.range >>= CUMULATIVE_BITS;
+        self.low += u64::from(self.range) * u64::from(low);
+        self.range *= high - low;
+        model.update(symbol);
         self.normalize();
+        symbol
+    }
+
+    fn raw(&mut self, count: u32, value: u32) -> u32 {
+        self.raw.push(count, value);
         value
     }
 }
 
-/// Reads decisions back. Reading past the end gives zeros; [`Self::is_exhausted`] tells.
+/// Reads decisions, symbols and raw bits back. Reading past the end gives zeros; [`Self::is_exhausted`] tells.
 #[derive(Debug)]
 pub(super) struct RangeDecoder<'a> {
     bytes: &'a [u8],
@@ -174,20 +168,60 @@ pub(super) struct RangeDecoder<'a> {
     /// How many follow: whole bytes, at least [`SPARE`] bits of them between decisions.
     spare: u32,
     range: u32,
+    raw: RawReader<'a>,
 }
 
-/// Raw bits that are coded at once.
-const RAW_BITS: u32 = 16;
-
-/// Bits that one decision can take up: a probability of 1/16384 leaves 2^10 of a range of 2^24, raw bits 2^8.
+/// Bits that one decision can take up: a probability of 1/16384 leaves 2^10 of a range of 2^24, a symbol's 2^9.
 const SPARE: u32 = 16;
+
+/// Reads raw bits back.
+#[derive(Debug)]
+struct RawReader<'a> {
+    bytes: &'a [u8],
+    /// Bytes taken into the window.
+    next: usize,
+    /// The next bits from the lowest one on, and how many.
+    window: u64,
+    count: u32,
+}
+
+impl RawReader<'_> {
+    #[inline]
+    fn read(&mut self, count: u32) -> u32 {
+        if self.count < u32::BITS {
+            let four = self.bytes.get(self.next..).and_then(<[u8]>::first_chunk);
+            let four = four.map_or_else(|| self.last_bytes(), |four| u32::from_le_bytes(*four));
+            self.window |= u64::from(four) << self.count;
+            self.next = self.next.saturating_add(4);
+            self.count += u32::BITS;
+        }
+        let value = self.window & ((1 << count) - 1);
+        self.window >>= count;
+        self.count -= count;
+        value as u32
+    }
+
+    #[cold]
+    fn last_bytes(&self) -> u32 {
+        let last = self.bytes.get(self.next..).unwrap_or_default();
+        last.iter().rev().fold(0, |bits, &byte| bits << u8::BITS | u32::from(byte))
+    }
+
+    /// Bits read.
+    #[inline]
+    fn position(&self) -> usize {
+        8 * self.next - self.count as usize
+    }
+}
 
 impl<'a> RangeDecoder<'a> {
     /// Zeros that may be read past the end, since the encoder leaves zeros at the end out.
     pub(super) const FREE_BYTES: u32 = 4;
 
-    pub(super) fn new(bytes: &'a [u8]) -> Self {
-        let mut decoder = Self { bytes, next: 0, window: 0, spare: 0, range: u32::MAX };
+    /// A decoder of the bytes of decisions and symbols, and of those of raw bits.
+    pub(super) fn new([bytes, raw]: [&'a [u8]; 2]) -> Self {
+        let raw = RawReader { bytes: raw, next: 0, window: 0, count: 0 };
+        let mut decoder = Self { bytes, next: 0, window: 0, spare: 0, range: u32::MAX, raw };
         for _ in 0..3 {
             decoder.window <<= SPARE;
             decoder.window |= u64::from(decoder.two_bytes());
@@ -232,17 +266,18 @@ impl<'a> RangeDecoder<'a> {
     /// Whether more has been read than any encoder wrote.
     #[inline]
     pub(super) fn is_exhausted(&self) -> bool {
-        self.used() > self.bytes.len() + Self::FREE_BYTES as usize
+        self.used() > self.bytes.len() + Self::FREE_BYTES as usize || self.raw.position() > 8 * self.raw.bytes.len()
     }
 
     /// Information of the decisions read so far, in bits.
     pub(super) fn position(&self) -> f64 {
-        8.0 * self.used() as f64 - f64::from(self.range).log2()
+        8.0 * self.used() as f64 - f64::from(self.range).log2() + self.raw.position() as f64
     }
 
-    /// Bytes at the end that were not read.
+    /// Bytes that were not read.
     pub(super) fn unread(&self) -> usize {
-        self.bytes.len().saturating_sub(self.used())
+        let raw = self.raw.bytes.len().saturating_sub(self.raw.position().div_ceil(8));
+        self.bytes.len().saturating_sub(self.used()) + raw
     }
 }
 
@@ -263,21 +298,28 @@ impl BitCoder for RangeDecoder<'_> {
         bit
     }
 
-    fn raw(&mut self, count: u32, _: u32) -> u32 {
-        if count > RAW_BITS {
-            let high = self.raw(count - RAW_BITS, 0);
-            return high << RAW_BITS | self.raw(RAW_BITS, 0);
-        }
-        self.range >>= count;
-        let value = ((self.window >> 32) as u32 / self.range).min((1 << count) - 1);
-        self.window -= u64::from(self.range * value) << 32;
+    #[inline]
+    fn symbol(&mut self, model: &mut SymbolModel, _: usize) -> usize {
+        self.range >>= CUMULATIVE_BITS;
+        let place = ((self.window >> 32) as u32 / self.range).min((1 << CUMULATIVE_BITS) - 1);
+        let symbol = model.symbol_at(place as i16);
+        let [low, high] = model.bounds(symbol);
+        self.window -= u64::from(self.range * low) << 32;
+        self.range *= high - low;
+        model.update(symbol);
         self.normalize();
-        value
+        symbol
+    }
+
+    #[inline]
+    fn raw(&mut self, count: u32, _: u32) -> u32 {
+        self.raw.read(count)
     }
 }
 
 #[cfg(all(test, feature = "encode"))]
 mod tests {
+    use super::super::models::SYMBOLS;
     use super::*;
 
     /// A sequence of (context, bit) with runs that force long carries.
@@ -292,27 +334,42 @@ mod tests {
             .collect()
     }
 
+    const EVEN: SymbolModel = SymbolModel::new([8; SYMBOLS]);
+
     #[test]
-    fn decisions_come_back_and_cost_about_their_entropy() {
+    fn what_is_written_comes_back() {
         // Miri is a thousand times slower.
         for seed in 0..if cfg!(miri) { 8 } else { 200 } {
             let decisions = decisions(seed, seed as usize * 37);
             let mut encoder = RangeEncoder::new();
-            let mut models = [BitModel::NEW; 4];
+            let (mut models, mut symbols) = ([BitModel::NEW; 4], EVEN);
             for &(context, bit) in &decisions {
                 encoder.bit(&mut models[context], bit);
-                encoder.raw(3, context as u32);
+                encoder.raw(3 + 7 * context as u32, context as u32);
+                encoder.symbol(&mut symbols, 5 * context);
             }
-            let bytes = encoder.finish();
-            let mut decoder = RangeDecoder::new(&bytes);
-            let mut models = [BitModel::NEW; 4];
+            let [bytes, raw] = encoder.finish();
+            let mut decoder = RangeDecoder::new([&bytes, &raw]);
+            let (mut models, mut symbols) = ([BitModel::NEW; 4], EVEN);
             for &(context, bit) in &decisions {
                 assert_eq!(decoder.bit(&mut models[context], false), bit);
-                assert_eq!(decoder.raw(3, 0), context as u32);
+                assert_eq!(decoder.raw(3 + 7 * context as u32, 0), context as u32);
+                assert_eq!(decoder.symbol(&mut symbols, 0), 5 * context);
             }
             assert!(!decoder.is_exhausted());
             assert_eq!(decoder.unread(), 0);
         }
+    }
+
+    #[test]
+    fn symbols_cost_about_their_entropy() {
+        let mut encoder = RangeEncoder::new();
+        let mut model = EVEN;
+        for i in 0..10_000usize {
+            encoder.symbol(&mut model, i.wrapping_mul(0x9e37_79b9) >> 7 & 3);
+        }
+        let [bytes, _] = encoder.finish();
+        assert!((2_400..2_600).contains(&bytes.len()));
     }
 
     #[test]
@@ -322,28 +379,22 @@ mod tests {
         for _ in 0..10_000 {
             encoder.bit(&mut model, true);
         }
-        assert!(encoder.finish().len() < 8);
+        assert!(encoder.finish()[0].len() < 8);
         let mut encoder = RangeEncoder::new();
-        encoder.bit(&mut BitModel { ..BitModel::NEW }, false);
-        assert!(encoder.finish().len() <= 1);
-    }
-
-    #[test]
-    fn probabilities_stay_inside() {
-        for bit in [false, true] {
-            let mut model = BitModel::NEW;
-            for _ in 0..if cfg!(miri) { 1_000 } else { 100_000 } {
-                model.update(bit);
-                assert!((4..=65_532).contains(&model.probability()));
-            }
-        }
+        encoder.bit(&mut { BitModel::NEW }, false);
+        assert!(encoder.finish()[0].len() <= 1);
     }
 
     #[test]
     fn reading_past_the_end_is_noticed() {
-        let mut decoder = RangeDecoder::new(&[]);
+        let mut decoder = RangeDecoder::new([&[], &[]]);
         assert!(!decoder.is_exhausted());
-        decoder.raw(32, 0);
+        decoder.raw(1, 0);
+        assert!(decoder.is_exhausted());
+        let mut decoder = RangeDecoder::new([&[], &[]]);
+        for _ in 0..9 {
+            decoder.symbol(&mut SymbolModel::new([8; SYMBOLS]), 0);
+        }
         assert!(decoder.is_exhausted());
     }
 }

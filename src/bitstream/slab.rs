@@ -14,16 +14,18 @@ use super::bits::Part;
 use super::colors::{ColorModels, ColorSteps, Grains, KnownColor};
 use super::connectivity::{Apex, ConnectivityModels, code_apex, code_vertex_id};
 use super::extents;
-use super::front::{Corner, Front, Met, NOWHERE, NewTet};
+use super::front::{Corner, Front, MAX_VERTICES, Met, NOWHERE, NewTet};
 use super::gate::Gate;
 use super::hops::{Hops, place};
 use super::labels::LabelModels;
+use super::models::BitModel;
 use super::near::Rings;
 use super::neighbours::Neighbours;
+use super::normals::{is_positive, point};
 use super::positions::{Behind, Bounds, PositionModels, code_free_position, code_position};
-use super::range_coder::{BitCoder, BitModel};
+use super::range_coder::BitCoder;
 use super::stars::Stars;
-use super::vertices::Vertices;
+use super::vertices::{Linked, Vertices};
 use super::{Limits, MeshFault};
 use crate::mesh::{Domain, TetMesh, VertexId, volume6};
 
@@ -42,6 +44,8 @@ pub(super) trait Side: BitCoder {
     fn vertex_coded(&mut self, id: VertexId);
     /// Whether all tets that are left have one label.
     fn is_uniform(&self) -> bool;
+    /// Whether a vertex that is left may be pinned.
+    fn has_pins(&self) -> bool;
     /// Label of the current tet; `count`, the number of labels so far, for a new one.
     fn label(&mut self, count: u32) -> u32;
     /// The current tet has a new wedge at the coded vertex `vertex`.
@@ -66,6 +70,8 @@ struct Models {
     colors: ColorModels,
     /// Whether all tets of a payload have the label before their gate.
     uniform: BitModel,
+    /// Whether vertices of a payload may be pinned.
+    pins: BitModel,
     /// Whether a seed follows.
     seed: BitModel,
     /// Whether a seed's corner is known.
@@ -90,18 +96,16 @@ pub(super) struct Slab {
     models: Box<Models>,
     /// Whether tets of the current packet that lie behind a gate have the label before it.
     is_uniform: bool,
+    /// Whether vertices of the current packet may be pinned.
+    has_pins: bool,
     /// Number of labels.
     labels: u32,
     /// Per wedge the next older one of its vertex.
     wedge_next: Vec<u32>,
     vertices: Vertices,
     neighbours: Neighbours,
-    /// Only where hops are passed on, as are the next two.
+    /// Only where hops are passed on.
     stars: Stars,
-    /// Vertices of each tet: the mesh has them only by way of its wedges.
-    corners: Vec<[VertexId; 4]>,
-    /// Per tet the lowest of the hops that its corners have been told.
-    told: Vec<u8>,
     /// Lengths of the mesh's arrays, and its duration, when the last packet was complete.
     complete: Complete,
 }
@@ -149,17 +153,17 @@ impl Slab {
                 labels: LabelModels::NEW,
                 colors: ColorModels::NEW,
                 uniform: BitModel::NEW,
+                pins: BitModel::NEW,
                 seed: BitModel::NEW,
                 seed_known: BitModel::NEW,
             }),
             is_uniform: false,
+            has_pins: false,
             labels: 0,
             wedge_next: Vec::new(),
             vertices: Vertices::default(),
             stars: Stars::default(),
             neighbours: Neighbours::default(),
-            corners: Vec::new(),
-            told: Vec::new(),
             complete: Complete { duration: 1, ..Complete::default() },
         }
     }
@@ -209,6 +213,8 @@ impl Slab {
         side.enter(Part::Labels);
         let is_uniform = side.is_uniform();
         self.is_uniform = side.bit(&mut self.models.uniform, is_uniform);
+        let has_pins = side.has_pins();
+        self.has_pins = side.bit(&mut self.models.pins, has_pins);
         loop {
             while let Some((vertex, hop)) = self.hops.next() {
                 while let Some(gate) = Gate::choose(&mut self.front, &self.vertices, vertex) {
@@ -250,46 +256,27 @@ impl Slab {
         }
         self.bounds.domain.duration = duration;
         self.bounds.top_known = true;
-        self.vertices.mark_top(top);
+        self.vertices.mark_top(top as f32);
         self.mesh.domain.duration = duration;
         Ok(())
     }
 
-    /// The neighbours of `vertex`, whose star is complete, are one edge farther. Tets that were there the last time
-    /// are passed over, so that all visits together are linear in the star. So are those that another vertex with as
-    /// low a hop has told.
+    /// The neighbours of `vertex`, whose star is complete, are one edge farther.
     fn pass_hop_on(&mut self, vertex: VertexId, hop: u8) {
-        if !self.hops.goes_on(hop) {
-            return;
-        }
-        let known = &mut self.vertices[vertex];
-        let star = known.star;
-        let new = if known.told_hop == hop { star.count - known.told_tets } else { star.count };
-        (known.told_tets, known.told_hop) = (star.count, hop);
-        for run in self.stars.runs(star, new) {
-            // All that are untold are found before the first of them is gone into: so the waits for memory overlap.
-            let untold = |(i, &tet): (usize, &u32)| u32::from(self.told[tet as usize] > hop) << i;
-            let mut untold: u32 = run.iter().enumerate().map(untold).sum();
-            while let Some(youngest) = untold.checked_ilog2() {
-                untold ^= 1 << youngest;
-                let tet = run[youngest as usize] as usize;
-                self.told[tet] = hop;
-                for neighbour in self.corners[tet] {
-                    self.hops.lower(neighbour, hop + 1);
-                }
-            }
+        if self.hops.goes_on(hop) {
+            self.stars.tell(vertex, hop, |neighbour| self.hops.lower(neighbour, hop + 1));
         }
     }
 
     /// Codes what lies behind an open face.
     fn close_gate(&mut self, side: &mut impl Side, gate: &Gate) -> Result<(), MeshFault> {
         side.check()?;
-        if self.is_walled(gate.corners) {
+        if gate.sides != 0 {
             // It lies on t = duration, which was not known when it was opened.
             self.front.give_up(gate.corner);
             return Ok(());
         }
-        let before = *self.front.before(gate.corner);
+        let before = self.front.before(gate.corner);
         let truth = side.behind(before.tet, gate.corners);
         let known = self.vertices.len();
         let around = (&mut self.front, &self.vertices);
@@ -308,13 +295,13 @@ impl Slab {
         let corners = [a, b, c, apex];
         // A new apex has no open faces.
         let is_known = apex.index() < known;
-        let met = if is_known { self.front.meet(&self.vertices, corners, gate.corner) } else { Met::NOTHING };
+        let met = if is_known { self.front.meet(&self.vertices, gate, apex) } else { Met::NOTHING };
         self.attach(side, corners, &met, Some((gate.corner, before.label)))
     }
 
     /// The slab ends at the t of this face.
     fn end_at_face(&mut self, corners: [VertexId; 3]) -> Result<(), MeshFault> {
-        let [t, second, third] = corners.map(|v| self.vertices.position(v).z);
+        let [t, second, third] = corners.map(|v| self.mesh.positions[v.index()].z);
         let bits = self.bounds.domain.subpixel_bits;
         for found in [second, third, t >> bits << bits] {
             if found != t {
@@ -322,11 +309,6 @@ impl Slab {
             }
         }
         self.end_at((t >> bits) as u32)
-    }
-
-    /// Whether the face lies on a side of the box, as far as its sides are known.
-    fn is_walled(&self, [a, b, c]: [VertexId; 3]) -> bool {
-        self.vertices[a].sides & self.vertices[b].sides & self.vertices[c].sides != 0
     }
 
     /// Codes the new vertex behind a gate.
@@ -346,16 +328,18 @@ impl Slab {
         let truth = side.new_vertex();
         if let Some((position, _)) = truth {
             self.check_inside(position)?;
-            let [a, b, c] = behind.gate;
-            self.check_positive(volume6(a, b, c, position))?;
+            let [a, b, c] = gate.corners.map(|v| self.mesh.positions[v.index()]);
+            self.check_positive([a, b, c, position])?;
         }
         let (position, pinned) = truth.unwrap_or_default();
         let position = code_position(side, &mut self.models.positions, &behind, &self.bounds, position)?;
         self.push_vertex(side, position, pinned)
     }
 
-    /// Whether six times the volume of the next tet is one that a tet may have.
-    fn check_positive(&self, volume6: i64) -> Result<(), MeshFault> {
+    /// Checks that the next tet, with these corners, is positive.
+    #[cold]
+    fn check_positive(&self, [a, b, c, d]: [IVec3; 4]) -> Result<(), MeshFault> {
+        let volume6 = volume6(a, b, c, d);
         let tet = self.mesh.tets.len() as u32;
         if volume6 > 0 { Ok(()) } else { Err(MeshFault::NotPositive { tet, volume6 }) }
     }
@@ -366,13 +350,14 @@ impl Slab {
         if position.z > (self.max_duration as i32) << self.bounds.domain.subpixel_bits {
             return Err(MeshFault::TooMany { field: "frames in a slab", limit: self.max_duration });
         }
-        if self.mesh.positions.len() >= self.limits.max_vertices as usize {
-            return Err(MeshFault::TooMany { field: "vertices", limit: self.limits.max_vertices });
+        let limit = self.limits.max_vertices.min(MAX_VERTICES - 1);
+        if self.mesh.positions.len() >= limit as usize {
+            return Err(MeshFault::TooMany { field: "vertices", limit });
         }
-        let pinned = self.models.positions.code_pinned(side, pinned);
+        let pinned = self.has_pins && self.models.positions.code_pinned(side, pinned);
         let vertex = self.mesh.push_vertex(position);
         self.mesh.pinned[vertex.index()] = pinned;
-        self.vertices.push(position, self.bounds.sides(position), self.front.push_list());
+        self.vertices.push(point(position), self.bounds.sides(position), self.front.push_list());
         let frame = (position.z >> self.bounds.domain.subpixel_bits) as u32;
         let place = place([position.x, position.y], self.bounds.domain.subpixel_bits);
         self.hops.push_vertex(frame, place);
@@ -426,30 +411,52 @@ impl Slab {
             return Err(MeshFault::TooMany { field: "tets", limit: self.limits.max_tets });
         }
         let around = corners.map(|v| &self.vertices[v]);
-        let (positions, sides) = (around.map(|v| v.position), around.map(|v| v.sides));
-        let [a, b, c, d] = positions;
-        self.check_positive(volume6(a, b, c, d))?;
+        let [a, b, c, d] = around.map(|v| v.position);
+        let edges = [a - d, b - d, c - d];
+        if !is_positive(edges) {
+            let [a, b, c, d] = corners.map(|v| self.mesh.positions[v.index()]);
+            self.check_positive([a, b, c, d])?;
+        }
+        let mut tet = NewTet {
+            number: tet,
+            label: 0,
+            corners,
+            sides: around.map(|v| v.sides),
+            ends: around.map(|v| v.open),
+            extents: extents::learn(around.map(|v| v.extent), edges),
+            edges,
+        };
         side.enter(Part::Labels);
         let before = gate.map(|(_, label)| label);
-        let closed = self.closed_labels(met);
-        let label = self.code_tet_label(side, corners, before, &closed)?;
-        let wedges = self.code_wedges(side, corners, label)?;
-        self.note_neighbours(wedges, label, &[closed[0], closed[1], closed[2], before]);
+        let wedges = match before {
+            Some(0) if self.is_uniform && self.labels == 1 => {
+                let wedges = self.code_wedges(side, corners, 0)?;
+                self.note_spokes(wedges, met);
+                wedges
+            }
+            _ => {
+                let closed = self.closed_labels(met);
+                tet.label = self.code_tet_label(side, corners, before, &closed)?;
+                let wedges = self.code_wedges(side, corners, tet.label)?;
+                self.note_neighbours(wedges, tet.label, &[closed[0], closed[1], closed[2], before]);
+                wedges
+            }
+        };
         self.mesh.tets.push(wedges);
         if self.hops.goes_on(0) {
-            self.corners.push(corners);
-            self.told.push(u8::MAX);
-            for vertex in corners {
-                self.stars.push(&mut self.vertices[vertex].star, tet);
-            }
+            self.stars.push(corners);
         }
-        extents::learn(&mut self.vertices, corners, positions);
-        let tet = NewTet { number: tet, label, corners, positions, sides };
+        let [a, b, c, d] = corners.map(Linked::one);
+        let links = if gate.is_some() { [d, d, d, a.with(b).with(c)] } else { [a.with(b).with(c).with(d); 4] };
+        for ((vertex, extent), links) in corners.into_iter().zip(tet.extents).zip(links) {
+            let vertex = &mut self.vertices[vertex];
+            (vertex.extent, vertex.linked) = (extent, vertex.linked.with(links));
+        }
         let gate = match gate {
             Some((gate, _)) => gate,
-            None => self.front.sow(&self.vertices, &tet),
+            None => self.front.sow(&tet),
         };
-        self.front.cover(&self.vertices, &tet, gate, met)?;
+        self.front.cover(&tet, gate, met)?;
         side.tet_coded();
         Ok(())
     }

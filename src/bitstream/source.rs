@@ -3,17 +3,21 @@
 //! In: a slab's committed mesh, which only grows. Out: the truth, decision by decision, in ids of the stream.
 //! Forbidden here: deciding anything; what is coded and in which order is the syntax's matter.
 
+mod faces;
+
 use std::collections::BTreeMap;
 
 use glam::IVec3;
 
 use super::colors::{Grains, to_grains};
 use super::connectivity::Apex;
-use super::range_coder::{BitCoder, BitModel, RangeEncoder};
+use super::models::{BitModel, SymbolModel};
+use super::range_coder::{BitCoder, RangeEncoder};
 use super::slab::Side;
 use super::{MeshFault, WriteError};
-use crate::mesh::{FACES, MeshError, TetMesh, VertexId, WedgeId};
+use crate::mesh::{MeshError, TetMesh, VertexId, WedgeId};
 use crate::video::Label;
+use faces::Faces;
 
 /// No tet, or no vertex.
 const NONE: u32 = u32::MAX;
@@ -21,73 +25,12 @@ const NONE: u32 = u32::MAX;
 /// Frames from here on are one: no slab is so long.
 const LAST_FRAME: usize = 1 << 19;
 
-/// A face of a tet: the one opposite this corner.
-#[derive(Debug, Clone, Copy)]
-struct FaceOfTet {
-    tet: u32,
-    corner: u8,
-}
-
-/// Faces met once so far.
-#[derive(Debug, Default)]
-struct Unpaired {
-    /// Per vertex the last entry of the faces whose lowest vertex it is.
-    last: Vec<u32>,
-    entries: Vec<UnpairedFace>,
-    /// Entries that are not in use.
-    free: Vec<u32>,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct UnpairedFace {
-    /// The other vertices, ascending.
-    others: [VertexId; 2],
-    face: FaceOfTet,
-    /// The entry before in the same list.
-    before: u32,
-}
-
-impl Unpaired {
-    /// The face with the same vertices, if it was met before; it is forgotten then. Else the new one is kept.
-    fn pair(&mut self, mut vertices: [VertexId; 3], face: FaceOfTet) -> Option<FaceOfTet> {
-        vertices.sort_unstable();
-        let [lowest, others @ ..] = vertices;
-        if self.last.len() <= lowest.index() {
-            self.last.resize(lowest.index() + 1, NONE);
-        }
-        let (mut younger, mut at) = (NONE, self.last[lowest.index()]);
-        while let Some(&entry) = self.entries.get(at as usize) {
-            if entry.others == others {
-                match self.entries.get_mut(younger as usize) {
-                    Some(younger) => younger.before = entry.before,
-                    None => self.last[lowest.index()] = entry.before,
-                }
-                self.free.push(at);
-                return Some(entry.face);
-            }
-            (younger, at) = (at, entry.before);
-        }
-        let entry = UnpairedFace { others, face, before: self.last[lowest.index()] };
-        self.last[lowest.index()] = match self.free.pop() {
-            Some(free) => {
-                self.entries[free as usize] = entry;
-                free
-            }
-            None => {
-                self.entries.push(entry);
-                self.entries.len() as u32 - 1
-            }
-        };
-        None
-    }
-}
-
 /// What is known about the source mesh beyond itself, from packet to packet.
 #[derive(Debug)]
 pub(super) struct Source {
     /// Tets across the face opposite each corner.
     neighbours: Vec<[u32; 4]>,
-    unpaired: Unpaired,
+    faces: Faces,
     /// Per source tet: whether it is coded.
     is_coded: Vec<bool>,
     /// How many are not.
@@ -112,7 +55,7 @@ impl Source {
     pub(super) fn new() -> Self {
         Self {
             neighbours: Vec::new(),
-            unpaired: Unpaired::default(),
+            faces: Faces::default(),
             is_coded: Vec::new(),
             left: 0,
             pending: Vec::new(),
@@ -147,15 +90,12 @@ impl Source {
             self.is_coded.push(false);
             self.left += 1;
             self.wait(mesh, tet as u32);
-            let vertices = mesh.tet_vertices(tet);
-            for (corner, face) in FACES.into_iter().enumerate() {
-                let here = FaceOfTet { tet: tet as u32, corner: corner as u8 };
-                if let Some(other) = self.unpaired.pair(face.map(|c| vertices[c]), here) {
-                    self.neighbours[tet][corner] = other.tet;
-                    self.neighbours[other.tet as usize][usize::from(other.corner)] = tet as u32;
-                }
-            }
         }
+        let neighbours = &mut self.neighbours;
+        self.faces.pair(mesh, known, |one, other| {
+            neighbours[one.tet()][one.corner()] = other.tet() as u32;
+            neighbours[other.tet()][other.corner()] = one.tet() as u32;
+        });
         Ok(())
     }
 
@@ -234,8 +174,8 @@ impl<'a> Writing<'a> {
         Self { source, mesh, low_frames, encoder, tet: 0, vertex: VertexId(0) }
     }
 
-    /// The payload.
-    pub(super) fn finish(self) -> Vec<u8> {
+    /// The bytes of decisions and symbols, and those of raw bits.
+    pub(super) fn finish(self) -> [Vec<u8>; 2] {
         self.encoder.finish()
     }
 
@@ -251,6 +191,12 @@ impl BitCoder for Writing<'_> {
         self.encoder.bit(model, bit)
     }
 
+    #[inline]
+    fn symbol(&mut self, model: &mut SymbolModel, symbol: usize) -> usize {
+        self.encoder.symbol(model, symbol)
+    }
+
+    #[inline]
     fn raw(&mut self, count: u32, value: u32) -> u32 {
         self.encoder.raw(count, value)
     }
@@ -304,6 +250,10 @@ impl Side for Writing<'_> {
 
     fn is_uniform(&self) -> bool {
         self.source.is_uniform
+    }
+
+    fn has_pins(&self) -> bool {
+        self.mesh.pinned.contains(&true)
     }
 
     fn label(&mut self, count: u32) -> u32 {

@@ -8,10 +8,9 @@
 
 use std::ops::{Index, IndexMut};
 
-use glam::IVec3;
+use glam::Vec3A;
 
 use super::front::Corner;
-use super::stars::Star;
 use crate::mesh::VertexId;
 
 /// The bit of the slab's end among the sides of the box.
@@ -22,19 +21,41 @@ pub(super) const TOP: u8 = 1 << 5;
 #[repr(align(64))]
 pub(super) struct Vertex {
     /// In lattice units.
-    pub(super) position: IVec3,
+    pub(super) position: Vec3A,
     /// Running mean of the extents of the edges at it ([`super::extents`]).
-    pub(super) extent: IVec3,
+    pub(super) extent: Vec3A,
+    /// [`Linked`] vertices: those at the other ends of its edges.
+    pub(super) linked: Linked,
     /// Where the list of its open faces ends.
     pub(super) open: Corner,
-    /// Its coded tets, where hops are passed on.
-    pub(super) star: Star,
-    /// How many of them had been told a hop of this vertex, and which.
-    pub(super) told_tets: u32,
-    pub(super) told_hop: u8,
+    pub(super) wedges: Wedges,
     /// The sides of the box that it lies on, as bits; the end of the slab is one once it is known.
     pub(super) sides: u8,
-    pub(super) wedges: Wedges,
+}
+
+/// A set of vertices in one word: it tells of most vertices that they are not in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Linked(u64);
+
+impl Linked {
+    pub(super) const NOTHING: Self = Self(0);
+
+    /// This vertex alone.
+    #[inline]
+    pub(super) fn one(vertex: VertexId) -> Self {
+        Self(1 << (vertex.0 % u64::BITS))
+    }
+
+    #[inline]
+    pub(super) fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Whether the two may have a vertex in common.
+    #[inline]
+    pub(super) fn may_meet(self, other: Self) -> bool {
+        self.0 & other.0 != 0
+    }
 }
 
 /// The wedges of a vertex.
@@ -52,21 +73,19 @@ pub(super) struct Wedges {
 pub(super) struct Vertices(Vec<Vertex>);
 
 impl Vertices {
-    pub(super) fn push(&mut self, position: IVec3, sides: u8, open: Corner) {
+    pub(super) fn push(&mut self, position: Vec3A, sides: u8, open: Corner) {
         self.0.push(Vertex {
             position,
-            extent: IVec3::ZERO,
+            extent: Vec3A::ZERO,
+            linked: Linked::NOTHING,
             open,
-            star: Star::EMPTY,
-            told_tets: 0,
-            told_hop: u8::MAX,
-            sides,
             wedges: Wedges { youngest: u32::MAX, label: 0, count: 0 },
+            sides,
         });
     }
 
     /// The slab ends at `top`.
-    pub(super) fn mark_top(&mut self, top: i32) {
+    pub(super) fn mark_top(&mut self, top: f32) {
         for vertex in self.0.iter_mut().filter(|vertex| vertex.position.z == top) {
             vertex.sides |= TOP;
         }
@@ -77,7 +96,7 @@ impl Vertices {
     }
 
     #[inline]
-    pub(super) fn position(&self, vertex: VertexId) -> IVec3 {
+    pub(super) fn position(&self, vertex: VertexId) -> Vec3A {
         self[vertex].position
     }
 }

@@ -4,7 +4,7 @@
 //! changing the mesh.
 
 use super::colors::ColorSteps;
-use super::framing::{PacketHeader, write_packet};
+use super::framing::{PacketHeader, write_packet, write_payload};
 use super::hops::rings;
 use super::slab::{Slab, SlabParams};
 use super::source::{Source, Writing};
@@ -96,7 +96,7 @@ impl SlabWriter {
         };
         let mut side = Writing::new(&mut self.source, mesh, low_frames);
         slab.code_packet(&mut side, low_frames)?;
-        body.extend_from_slice(&side.finish());
+        write_payload(&mut body, &side.finish());
         self.frame(&body, last)
     }
 

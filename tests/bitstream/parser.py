@@ -10,7 +10,7 @@ import struct
 import sys
 import zlib
 from collections import deque
-from math import floor, sqrt
+from math import floor, frexp, sqrt
 
 FAR_EXTENT = 1 << 19
 SCAN = 24
@@ -25,8 +25,8 @@ def f32(value):
 
 
 def log2(value):
-    """floor(log2) of a positive integer."""
-    return value.bit_length() - 1
+    """floor(log2) of a number that is at least 1."""
+    return frexp(value)[1] - 1
 
 
 # Section 3: entropy coding
@@ -40,9 +40,25 @@ class Bit:
         self.seen = 0
 
 
-class RangeDecoder:
+class Symbols:
+    """A model of a symbol."""
+
+    def __init__(self, weights):
+        assert sum(weights) == 128
+        self.below = [256 * sum(weights[:i]) for i in range(17)]
+        self.seen = 0
+
+
+class Decoder:
+    """Decisions, symbols and raw numbers of a payload."""
+
     def __init__(self, payload):
-        self.payload = payload
+        length, at = parse_varint(payload, 0)
+        assert at + length <= len(payload), "raw bits within the payload"
+        self.raw_bytes = payload[at : at + length]
+        self.raw_bits = int.from_bytes(self.raw_bytes, "little")
+        self.raw_at = 0
+        self.coded = payload[at + length :]
         self.at = 0
         self.range = 0xFFFFFFFF
         self.code = 0
@@ -50,7 +66,7 @@ class RangeDecoder:
             self.shift()
 
     def shift(self):
-        byte = self.payload[self.at] if self.at < len(self.payload) else 0
+        byte = self.coded[self.at] if self.at < len(self.coded) else 0
         self.at += 1
         self.code = (self.code << 8 | byte) & 0xFFFFFFFF
 
@@ -62,42 +78,57 @@ class RangeDecoder:
     def bit(self, model):
         bound = self.range * (model.average >> 6) >> 16
         bit = self.code < bound
-        rate = 131072 // (2 * model.seen + 3)
         if bit:
             self.range = bound
-            model.average += ((1 << 22) - model.average) * rate >> 16
         else:
             self.code -= bound
             self.range -= bound
-            model.average -= model.average * rate >> 16
+        end = (1 << 22) - 256 if bit else 256
+        model.average += (end - model.average) * (131072 // (2 * model.seen + 3)) >> 16
         model.seen = min(model.seen + 1, 255)
         self.normalize()
         return int(bit)
 
-    def raw(self, count):
-        if count > 16:
-            high = self.raw(count - 16)
-            return high << 16 | self.raw(16)
-        self.range >>= count
-        value = min(self.code // self.range, (1 << count) - 1)
-        self.code -= value * self.range
+    def symbol(self, model):
+        self.range >>= 15
+        place = min(self.code // self.range, 32767)
+        symbol = max(s for s in range(16) if model.below[s] <= place)
+        self.code -= self.range * model.below[symbol]
+        self.range *= model.below[symbol + 1] - model.below[symbol]
+        rate = 65536 // (model.seen + 3)
+        for s in range(1, 16):
+            end = 32752 + s if s > symbol else s
+            model.below[s] += (end - model.below[s]) * rate + 32768 >> 16
+        model.seen = min(model.seen + 1, 253)
         self.normalize()
+        return symbol
+
+    def raw(self, count):
+        value = self.raw_bits >> self.raw_at & (1 << count) - 1
+        self.raw_at += count
         return value
 
     def check_end(self):
-        assert len(self.payload) <= self.at <= len(self.payload) + 4, "payload read to its end and not beyond"
+        assert len(self.coded) <= self.at <= len(self.coded) + 4, "coded bytes read to their end and not beyond"
+        assert (self.raw_at + 7) // 8 == len(self.raw_bytes), "raw bits read to their end and not beyond"
 
 
 class Models:
     """Models by name and indices, made when they are first used."""
 
     def __init__(self):
-        self.bits = {}
+        self.models = {}
 
-    def of(self, *name):
-        if name not in self.bits:
-            self.bits[name] = Bit()
-        return self.bits[name]
+    def of(self, make, *name):
+        if name not in self.models:
+            self.models[name] = make()
+        return self.models[name]
+
+
+SMALL = (24, 20, 16, 13, 11, 9, 7, 6, 5, 4, 3, 3, 2, 2, 1, 2)
+SIGNED = (1, 1, 2, 3, 5, 9, 14, 19, 21, 18, 13, 9, 6, 3, 2, 2)
+RESIDUAL = (18, 12, 12, 9, 9, 8, 8, 8, 8, 8, 8, 6, 6, 3, 3, 2)
+CLASSES = ((1, 0), (2, 0), (3, 0), (4, 1), (6, 2), (10, 3), (18, 4))
 
 
 class Coder:
@@ -108,7 +139,10 @@ class Coder:
         self.models = models
 
     def bit(self, *name):
-        return self.decoder.bit(self.models.of(*name))
+        return self.decoder.bit(self.models.of(Bit, *name))
+
+    def symbol(self, weights, *name):
+        return self.decoder.symbol(self.models.of(lambda: Symbols(weights), *name))
 
     def uint(self, *name):
         e = 0
@@ -120,11 +154,27 @@ class Coder:
         rest = e - min(e, 2)
         return (number << rest | self.decoder.raw(rest)) - 1
 
-    def int(self, *name):
-        if self.bit(*name, "zero"):
+    def small(self, escape, *name):
+        symbol = self.symbol(SMALL, *name)
+        return symbol if symbol < 15 else 15 + self.uint(*escape)
+
+    def signed(self, escape, *name):
+        symbol = self.symbol(SIGNED, *name)
+        if symbol == 0:
+            return -8 - self.uint(*escape)
+        return symbol - 8 if symbol < 15 else 7 + self.uint(*escape)
+
+    def residual(self, escape, *name):
+        symbol = self.symbol(RESIDUAL, *name)
+        if symbol == 0:
             return 0
-        negative = self.bit(*name, "negative")
-        magnitude = self.uint(*name) + 1
+        if symbol == 15:
+            negative = self.decoder.raw(1)
+            magnitude = 34 + self.uint(*escape)
+        else:
+            negative = symbol % 2 == 0
+            least, digits = CLASSES[(symbol - 1) // 2]
+            magnitude = least + self.decoder.raw(digits)
         return -magnitude if negative else magnitude
 
 
@@ -155,10 +205,9 @@ def cross32(u, v):
     return tuple(f32(f32(u[i] * v[j]) - f32(v[i] * u[j])) for i, j in ((1, 2), (2, 0), (0, 1)))
 
 
-def unit_normal(a, b, c, extent):
-    n = cross(sub(b, a), sub(c, a))
-    n = tuple(f32(f32(component) * f32(e)) for component, e in zip(n, extent))
-    length = f32(sqrt(dot32(n, n)))
+def unit_normal(plane, extent):
+    n = tuple(f32(f32(p) * e) for p, e in zip(plane, extent))
+    length = max(f32(sqrt(dot32(n, n))), 1.0)
     return tuple(f32(component / length) for component in n)
 
 
@@ -168,6 +217,7 @@ class Face:
         self.tet = tet
         self.normal = normal
         self.across = [None] * 3
+        self.wide = [False] * 3
 
     def place(self, vertex):
         return self.corners.index(vertex)
@@ -207,10 +257,11 @@ class Edge:
         return self.partner and self.partner.previous.vertex
 
 
-def pair(one, other):
+def pair(one, other, wide=False):
     for edge, partner in ((one, other), (other, one)):
         if edge is not None:
             edge.face.across[edge.at] = partner
+            edge.face.wide[edge.at] = wide
 
 
 class Slope:
@@ -218,7 +269,7 @@ class Slope:
         self.p, self.q = 0, 64
 
     def at(self, f):
-        return (2 * self.p * f + self.q) // (2 * self.q)
+        return floor(f32(f32(f32(self.p * f32(f)) / f32(self.q)) + 0.5))
 
     def learn(self, f, r):
         f, r = max(-255, min(255, f)), max(-255, min(255, r))
@@ -251,12 +302,13 @@ class Slab:
     # Section 5: order
 
     def parse_payload(self, payload, last):
-        self.coder = Coder(RangeDecoder(payload), self.models)
+        self.coder = Coder(Decoder(payload), self.models)
         self.low = None if last else (self.packets + 1) * self.unit
         newly_low = [v for v in range(len(self.positions)) if self.is_low(v) and self.hops[v] > 0]
         for v in sorted(newly_low, key=lambda v: (self.place(v), v)):
             self.lower(v, 0)
         self.uniform = self.coder.bit("uniform")
+        self.pins = self.coder.bit("pins")
         while True:
             while (found := self.next_vertex()) is not None:
                 v, hop = found
@@ -324,8 +376,8 @@ class Slab:
         assert all(0 <= p <= side for p, side in zip(position, self.far())), "inside the box"
         v = len(self.positions)
         self.positions.append(position)
-        self.pinned.append(self.coder.bit("pinned"))
-        self.extents.append((0, 0, 0))
+        self.pinned.append(self.coder.bit("pinned") if self.pins else 0)
+        self.extents.append((0.0, 0.0, 0.0))
         for lists in (self.open, self.stars, self.wedges_at):
             lists.append([])
         self.hops.append(9)
@@ -344,16 +396,21 @@ class Slab:
     # Section 4: extents
 
     def extent(self, corners):
-        return tuple(max(48, sum(self.extents[v][axis] for v in corners)) for axis in range(3))
+        a, b, c = (self.extents[v] for v in corners)
+        return tuple(max(3.0, f32(f32(a[axis] + b[axis]) + c[axis])) for axis in range(3))
 
     def learn_extents(self, corners):
         at = [self.positions[v] for v in corners]
-        edges = [tuple(16 * abs(p - q) for p, q in zip(at[3], own)) for own in at[:3]]
+        edges = [tuple(float(abs(p - q)) for p, q in zip(at[3], own)) for own in at[:3]]
         for v, here in zip(corners, edges):
             old = self.extents[v]
-            self.extents[v] = here if old == (0, 0, 0) else tuple(o + (h - o) // 8 for o, h in zip(old, here))
-        if self.extents[corners[3]] == (0, 0, 0):
-            self.extents[corners[3]] = tuple(sum(edge[axis] for edge in edges) // 3 for axis in range(3))
+            if any(old):
+                self.extents[v] = tuple(f32(o + f32(f32(h - o) * 0.125)) for o, h in zip(old, here))
+            else:
+                self.extents[v] = here
+        if not any(self.extents[corners[3]]):
+            sums = [f32(f32(a + b) + c) for a, b, c in zip(*edges)]
+            self.extents[corners[3]] = tuple(f32(s / 3.0) for s in sums)
 
     # Section 6: gate and apex
 
@@ -361,17 +418,18 @@ class Slab:
         return [Edge(face, face.place(v)) for face in reversed(self.open[v][-scan:])]
 
     def is_positive(self, gate, apex):
-        return volume6(*(self.positions[v] for v in gate), self.positions[apex]) > 0
+        a, b, c = (self.positions[v] for v in gate)
+        plane = cross32(sub(b, a), sub(c, a))
+        return dot32(plane, sub(self.positions[apex], a)) > 0.0
 
     def sharpness(self, edge):
-        if edge.partner is None:
+        if edge.partner is None or edge.face.wide[edge.at]:
             return 0
         n, m = edge.face.normal, edge.partner.face.normal
         along = sub(self.positions[edge.partner.vertex], self.positions[edge.vertex])
         if not dot32(cross32(n, m), along) < 0.0:
             return 0
-        cos = -dot32(n, m)
-        return floor(max(0.0, min(253.0, f32(f32(cos + 1.0) * 126.5)))) + 1
+        return 1 + min(253, floor(max(0.0, f32(f32(1.0 - dot32(n, m)) * 126.5))))
 
     def choose_gate(self, v):
         corners = self.corners_at(v)
@@ -405,9 +463,9 @@ class Slab:
     def distance2(self, corners, vertex):
         a, b, c = (self.positions[v] for v in corners)
         p = self.positions[vertex]
-        extent = self.extent(corners)
-        d = tuple(f32(f32(3 * p[i] - (a[i] + b[i] + c[i])) / f32(extent[i])) for i in range(3))
-        return 256.0 * dot32(d, d)
+        inverse = tuple(f32(1.0 / e) for e in self.extent(corners))
+        d = tuple(f32(float(3 * p[i] - (a[i] + b[i] + c[i])) * inverse[i]) for i in range(3))
+        return dot32(d, d)
 
     def parse_apex(self, corners, edges):
         across = [edge.vertex_across for edge in edges]
@@ -425,8 +483,8 @@ class Slab:
         if self.coder.bit("new", count, *first):
             return "new"
         asked = {v for v, edge in zip(across, edges) if v is not None and self.sharpness(edge)}
+        asked.update(corners)
         near = self.ring(corners)
-        far = self.ring(near) - near
         if rank := self.coder.uint("near"):
             return self.ranked(corners, near - asked)[rank - 1]
         if self.coder.bit("nothing"):
@@ -434,11 +492,14 @@ class Slab:
                 self.end_at(self.positions[corners[0]][2] // self.unit)
             return None
         if rank := self.coder.uint("far"):
+            far = self.ring(near) - set(self.ranked(corners, near))
             return self.ranked(corners, far - asked)[rank - 1]
         return self.coder.decoder.raw(len(self.positions).bit_length())
 
     def ring(self, vertices):
-        return {vertex for v in vertices for corner in self.corners_at(v) for vertex in corner.corners[1:]}
+        corners = [corner for v in vertices for corner in self.corners_at(v)]
+        seconds = {corner.next.vertex for corner in corners}
+        return seconds | {corner.previous.vertex for corner in corners if corner.previous.partner is None}
 
     def ranked(self, corners, vertices):
         positive = [v for v in vertices if self.is_positive(corners, v)]
@@ -524,7 +585,8 @@ class Slab:
         return gate
 
     def open_face(self, corners, tet):
-        normal = unit_normal(*(self.positions[v] for v in corners), self.extent(corners))
+        a, b, c = (self.positions[v] for v in corners)
+        normal = unit_normal(cross32(sub(a, c), sub(b, c)), self.extent(corners))
         face = Face(corners, tet, normal)
         for v in corners:
             self.open[v].append(face)
@@ -558,6 +620,8 @@ class Slab:
                 along = known.vertex == corners[place]
                 pair(one, partner if along else known)
                 pair(other, known if along else partner)
+            elif closed[towards] is None and closed[back] is None:
+                pair(one, other, wide=True)
             elif closed[towards] is None or closed[back] is None or one != closed[back].previous:
                 pair(one, other)
 
@@ -602,21 +666,23 @@ class Slab:
         sums = [sum(values) for values in channels]
         variance = [n * sum(x * x for x in values) - s * s for values, s in zip(channels, sums)]
         step = self.step_of(self.wedges[wedge][0])
-        prediction = [(2 * s + n * step) // (2 * n * step) if n else 0 for s in sums]
+        scale = f32(1.0 / f32(max(n, 1) * step))
+        prediction = [floor(f32(f32(f32(s) * scale) + 0.5)) for s in sums]
         missed = [sum(misses[i] for _, misses in known) for i in range(2)]
 
         def class_of(v, m):
-            return 16 + n if n < 2 else min(15, log2(4 * (v + m * m) // (n * n * step * step) + 1))
+            spread = f32(f32(v + m * m) * f32(f32(4.0 * scale) * scale))
+            return 16 + n if n < 2 else min(15, log2(f32(spread + 1.0)))
 
         a, c = class_of(variance[0], missed[0]), class_of(variance[1] + variance[2], missed[1])
         rg, bg, br = (self.slopes[name] for name in ("rg", "bg", "br"))
-        green = self.coder.int("green", a)
+        green = self.coder.residual(("color",), "green", a)
         context = log2(min(abs(green), 7) + 1)
         along = rg.at(green)
-        red = self.coder.int("red", c, context)
+        red = self.coder.residual(("color",), "red", c, context)
         rg.learn(green, along + red)
         along2, along3 = br.at(red), bg.at(green)
-        blue = self.coder.int("blue", c, context)
+        blue = self.coder.residual(("color",), "blue", c, context)
         bg.learn(green, along3 + along2 + blue)
         br.learn(red, along2 + blue)
         g = prediction[0] + green
@@ -625,8 +691,8 @@ class Slab:
         self.misses.append((min(abs(green) * step, 65535), min((abs(red) + abs(blue)) * step, 65535)))
 
     def step_of(self, vertex):
-        x, y, t = (max(extent, 1) for extent in self.extents[vertex])
-        octaves = (self.size - log2(x * y * t)) // 2
+        x, y, t = (max(16.0 * extent, 1.0) for extent in self.extents[vertex])
+        octaves = (self.size - log2(f32(f32(x * y) * t))) // 2
         return self.step << min(max(octaves, -3), 2) + 3
 
     # Section 8: vertices
@@ -634,16 +700,16 @@ class Slab:
     def parse_position(self, gate, corners, across):
         a, b, c = points = [self.positions[v] for v in corners]
         e = self.positions[next(v for v in self.tets[gate.tet] if v not in corners)]
-        extent = tuple(f32(f32(x) / 48.0) for x in self.extent(corners))
-        n = unit_normal(a, b, c, self.extent(corners))
+        n = unit_normal(cross(sub(b, a), sub(c, a)), self.extent(corners))
+        extent = tuple(f32(x / 3.0) for x in self.extent(corners))
         predicted = []
         for i in range(3):
             s = a[i] + b[i] + c[i]
-            ahead = 3 * (6 * b[i] - 3 * a[i] - e[i]) - 2 * s
-            for weight, vertex in zip((4, 2, 1), across):
+            ahead = f32(f32(3.0 * f32(f32(6.0 * b[i] - 3.0 * a[i]) - e[i])) - 2.0 * s)
+            for weight, vertex in zip((4.0, 2.0, 1.0), across):
                 if vertex is not None:
-                    ahead += weight * (3 * self.positions[vertex][i] - s)
-            center = f32(f32(f32(s) / 3.0) + f32(f32(ahead) / 48.0))
+                    ahead = f32(ahead + weight * (3 * self.positions[vertex][i] - s))
+            center = f32(f32(s / 3.0) + f32(ahead / 48.0))
             predicted.append(floor(f32(f32(center + f32(f32(0.625 * extent[i]) * n[i])) + 0.5)))
         last = max(range(3), key=lambda i: abs(n[i]))
         position = [None, None, None]
@@ -653,7 +719,7 @@ class Slab:
                 position[axis] = side
             elif axis != last:
                 scale = scale_class(extent[axis])
-                position[axis] = predicted[axis] + self.low_digits(self.coder.int("free", axis, scale), scale)
+                position[axis] = predicted[axis] + self.low_digits(self.coder.signed((axis,), "free", axis, context(axis, scale)), scale)
             else:
                 position[axis] = self.parse_height(points, position, axis, (predicted[axis], extent[axis], n[axis]))
         return tuple(position)
@@ -669,7 +735,10 @@ class Slab:
                 continue
             beyond = predicted if side == 0 else high - predicted
             nearness = 0 if beyond <= 0 else 1 if f32(beyond) <= extent else 2
-            if self.coder.bit("on side", axis, side, sum(p[axis] == place for p in points), nearness):
+            corners = sum(p[axis] == place for p in points)
+            if corners == 0 and nearness == 2:
+                continue
+            if self.coder.bit("on side", axis, side, corners, nearness):
                 return place
         return None
 
@@ -684,11 +753,15 @@ class Slab:
         w = f32(extent / abs(n))
         m = floor(max(0.0, min(4.0, f32(f32(f32((predicted - nearest) * direction) / w) * 4.0))))
         scale = scale_class(w)
-        return nearest + direction * self.low_digits(self.coder.uint("height", axis, scale, m), scale)
+        return nearest + direction * self.low_digits(self.coder.small((axis,), "height", axis, context(axis, scale), m), scale)
 
 
 def scale_class(length):
-    return min(39, log2(floor(max(1.0, f32(length * length)))))
+    return min(39, log2(max(1.0, f32(length * length))))
+
+
+def context(axis, scale):
+    return 8 + scale % 2 if axis < 2 and scale >= 8 else scale
 
 
 # Sections 1 and 2: packets
@@ -697,19 +770,9 @@ def scale_class(length):
 def parse_header(data):
     fields = []
     at = 0
-
-    def varint():
-        nonlocal at
-        first = data[at]
-        size = {251: 2, 252: 4, 253: 8}.get(first)
-        at += 1
-        if size is None:
-            return first
-        at += size
-        return int.from_bytes(data[at - size : at], "little")
-
     for name in ("width", "height", "rate", "rate_base", "aspect", "aspect_base"):
-        fields.append((name, varint()))
+        value, at = parse_varint(data, at)
+        fields.append((name, value))
     for name in ("subpixel_bits", "levels"):
         fields.append((name, data[at]))
         at += 1
@@ -717,11 +780,20 @@ def parse_header(data):
     return dict(fields)
 
 
+def parse_varint(data, at):
+    """A number of the variable-length code, and where it ends."""
+    size = {251: 2, 252: 4, 253: 8}.get(data[at])
+    at += 1
+    if size is None:
+        return data[at - 1], at
+    return int.from_bytes(data[at : at + size], "little"), at + size
+
+
 def packets(stream):
     at = 0
     while at < len(stream):
-        keyframe = stream[at : at + 8] == b"\x89TETV\r\n\x04"
-        assert keyframe or stream[at : at + 4] == b"\x89TVP", "a start code of version 4"
+        keyframe = stream[at : at + 8] == b"\x89TETV\r\n\x05"
+        assert keyframe or stream[at : at + 4] == b"\x89TVP", "a start code of version 5"
         start = at + (8 if keyframe else 4)
         flags, length, frame, check = struct.unpack_from("<BIQH", stream, start)
         packet = stream[at : at + length]

@@ -1,20 +1,22 @@
 //! The front moves over a new tet.
 //!
 //! In: a tet behind a gate, and which of its other faces lie on the box. Out: the front with the tet behind it.
-//! Forbidden here: positions, coding.
+//! Forbidden here: coding.
 //!
 //! Around an edge, runs of tets and gaps take turns; partners are the two open faces on both sides of a gap. A tet that
 //! fills a part of a gap passes it on from one of its two faces there to the other: if such a face closes an open one,
 //! that one's partner is what lies beyond; if it opens, the new face itself. An edge that the front has elsewhere and now
 //! has once more gets two gaps, each between a new face and an old one.
 
-use glam::{IVec3, Vec3};
+use glam::Vec3A;
 
-use super::{Before, Corner, Front};
+use super::rows::{Row, enlist, pair, pair_as, unlist};
+use super::{Before, Corner, Front, WIDE};
 use crate::bitstream::MeshFault;
 use crate::bitstream::extents;
-use crate::bitstream::gate::{plane, unit_normal};
-use crate::bitstream::vertices::Vertices;
+use crate::bitstream::gate::Gate;
+use crate::bitstream::normals::{cross, unit_normal};
+use crate::bitstream::vertices::{Linked, Vertices};
 use crate::mesh::VertexId;
 
 /// Open faces of a vertex that are looked at to find those that a tet meets. No stream can make a search long.
@@ -30,9 +32,14 @@ pub(in crate::bitstream) struct NewTet {
     pub(in crate::bitstream) label: u32,
     /// Its corners, the apex last.
     pub(in crate::bitstream) corners: [VertexId; 4],
-    pub(in crate::bitstream) positions: [IVec3; 4],
     /// The sides of the box that they lie on, as bits.
     pub(in crate::bitstream) sides: [u8; 4],
+    /// Where the lists of their open faces end.
+    pub(in crate::bitstream) ends: [Corner; 4],
+    /// Extents there.
+    pub(in crate::bitstream) extents: [Vec3A; 4],
+    /// From the apex to the others.
+    pub(in crate::bitstream) edges: [Vec3A; 3],
 }
 
 /// What of the front a tet behind a gate meets.
@@ -57,35 +64,38 @@ impl Met {
 }
 
 impl Front {
-    /// What a tet behind `gate` (its corner at the first vertex) with a known apex meets.
+    /// What a tet behind a gate with a known apex meets.
     ///
     /// Where the apex lies across edges of the gate, these tell. Across one only, or none, the far ends of the edge that
-    /// is new may have it elsewhere on the front.
-    #[inline]
-    pub(in crate::bitstream) fn meet(&self, vertices: &Vertices, corners: [VertexId; 4], gate: Corner) -> Met {
-        let [first, second, third, apex] = corners;
-        let [at_gate, at_next, at_previous] = self.across_from(gate);
+    /// is new may have it elsewhere on the front: only if the two have had an edge before.
+    #[inline(always)]
+    pub(in crate::bitstream) fn meet(&self, vertices: &Vertices, gate: &Gate, apex: VertexId) -> Met {
+        let [first, second, third] = gate.corners;
         let mut met = Met::NOTHING;
         let mut count = 0;
         let mut far = apex;
-        for (face, (partner, opposite)) in
-            [(at_next, first), (at_previous, second), (at_gate, third)].into_iter().enumerate()
-        {
-            let corner = partner.previous();
-            let is_closed = partner.is_some() & (self.vertex(corner) == apex);
-            met.closed[face] = if is_closed { corner } else { Corner::NONE };
+        // The order of the gate's edges is another one than that of the tet's faces.
+        for (face, edge, opposite) in [(0, 2, first), (1, 0, second), (2, 1, third)] {
+            let is_closed = gate.across[edge] == apex;
+            met.closed[face] = if is_closed { gate.opposite[edge] } else { Corner::NONE };
             count += u32::from(is_closed);
             far = if is_closed { opposite } else { far };
         }
-        if count <= 1 {
-            self.look_around(vertices, corners, far, &mut met);
+        let others = [first, second, third].map(Linked::one);
+        let wanted = match count {
+            0 => others[0].with(others[1]).with(others[2]),
+            1 => Linked::one(apex),
+            _ => Linked::NOTHING,
+        };
+        if vertices[far].linked.may_meet(wanted) {
+            self.look_around(vertices, [first, second, third, apex], far, &mut met);
         }
         met
     }
 
     /// Looks for open faces at `far` that share more with a tet than that vertex: it is the apex, or the corner of the gate
     /// that only the edge to the apex leads to.
-    #[inline]
+    #[inline(never)]
     fn look_around(&self, vertices: &Vertices, corners: [VertexId; 4], far: VertexId, met: &mut Met) {
         let apex = corners[3];
         for corner in self.at(vertices, far).take(SCAN) {
@@ -129,17 +139,21 @@ impl Front {
 
     /// Opens the last face of a seed, a tet that no face leads to, and the gate that the tet is then behind: two sides of a
     /// sheet. Returns the gate's corner at the first vertex.
-    pub(in crate::bitstream) fn sow(&mut self, vertices: &Vertices, tet: &NewTet) -> Corner {
+    pub(in crate::bitstream) fn sow(&mut self, tet: &NewTet) -> Corner {
         let [a, b, c, opposite] = tet.corners;
         let before = Before { tet: tet.number, label: tet.label, opposite };
-        let [at_a, at_b, at_c] = [a, b, c].map(|vertex| (vertex, vertices[vertex].open));
-        let gate = self.insert([at_a, at_b, at_c], Vec3::ZERO, before);
+        let [at_a, at_b, at_c] = [(a, tet.ends[0]), (b, tet.ends[1]), (c, tet.ends[2])];
+        self.reserve(2);
+        let Self { rows, normals, free, .. } = self;
+        let gate = open(rows, normals, free, [at_a, at_b, at_c], Vec3A::ZERO, before);
         if tet.sides[0] & tet.sides[1] & tet.sides[2] == 0 {
-            let normal = side_normal(vertices, tet, [0, 2, 1]);
-            let back = self.insert([at_a, at_c, at_b], normal, before);
-            self.pair(gate, back.previous());
-            self.pair(gate.next(), back.next());
-            self.pair(gate.previous(), back);
+            let [to_a, to_b, to_c] = tet.edges;
+            let [of_a, of_b, of_c, _] = tet.extents;
+            let normal = unit_normal(cross(to_a - to_b, to_c - to_b), extents::around([of_a, of_b, of_c]));
+            let back = open(rows, normals, free, [at_a, at_c, at_b], normal, before);
+            pair(rows, gate, back.previous());
+            pair(rows, gate.next(), back.next());
+            pair(rows, gate.previous(), back);
         }
         gate
     }
@@ -149,109 +163,125 @@ impl Front {
     ///
     /// # Errors
     /// An open face that is there already.
-    #[inline]
-    pub(in crate::bitstream) fn cover(
-        &mut self,
-        vertices: &Vertices,
-        tet: &NewTet,
-        gate: Corner,
-        met: &Met,
-    ) -> Result<(), MeshFault> {
-        let [at_gate, at_next, at_previous] = self.across_from(gate);
+    #[inline(never)]
+    pub(in crate::bitstream) fn cover(&mut self, tet: &NewTet, gate: Corner, met: &Met) -> Result<(), MeshFault> {
+        // One of three comes from the gate.
+        self.reserve(2);
+        let (rows, normals, free) = (&mut self.rows[..], &mut self.normals[..], &mut self.free);
+        let [at_gate, at_next, at_previous] = unlist(rows, gate);
+        free.push(gate.face() as u32);
         let gate_beyond = [at_next, at_previous, at_gate];
-        self.remove(gate);
-        let lists = tet.corners.map(|vertex| (vertex, vertices[vertex].open));
         let beyond = [
-            self.pass_side(vertices, tet, met, (0, 1, 2), &lists)?,
-            self.pass_side(vertices, tet, met, (1, 2, 0), &lists)?,
-            self.pass_side(vertices, tet, met, (2, 0, 1), &lists)?,
+            pass_side(rows, normals, free, tet, met, (0, 1, 2))?,
+            pass_side(rows, normals, free, tet, met, (1, 2, 0))?,
+            pass_side(rows, normals, free, tet, met, (2, 0, 1))?,
         ];
-        for face in 0..3 {
+        for (face, (beyond_gate, [beyond, ..])) in gate_beyond.into_iter().zip(beyond).enumerate() {
             // A gap that the tet fills has no sides any more: its two faces there close both.
             let closed = met.closed[face];
-            let is_filled = closed.is_some() & (gate_beyond[face] == closed.next());
-            let pick = |edge| if is_filled { Corner::NONE } else { edge };
-            self.pair(pick(gate_beyond[face]), pick(beyond[face][0]));
+            if !(closed.is_some() & (beyond_gate == closed.next())) {
+                pair(rows, beyond_gate, beyond);
+            }
         }
-        self.join_spoke(tet, met, (0, 1, 2), &beyond);
-        self.join_spoke(tet, met, (1, 2, 0), &beyond);
-        self.join_spoke(tet, met, (2, 0, 1), &beyond);
+        join_spoke(rows, tet, met, (0, 1, 2), &beyond);
+        join_spoke(rows, tet, met, (1, 2, 0), &beyond);
+        join_spoke(rows, tet, met, (2, 0, 1), &beyond);
         Ok(())
-    }
-
-    /// Takes out the open face that a face of a tet closes, or opens that face unless it lies on the box: it has the gate's
-    /// edge `from`, `to` and the apex. Returns what lies beyond.
-    #[inline(always)]
-    fn pass_side(
-        &mut self,
-        vertices: &Vertices,
-        tet: &NewTet,
-        met: &Met,
-        (face, from, to): (usize, usize, usize),
-        lists: &[(VertexId, Corner); 4],
-    ) -> Result<Beyond, MeshFault> {
-        let closed = met.closed[face];
-        if closed.is_some() {
-            let [at_apex, at_next, at_previous] = self.across_from(closed);
-            self.remove(closed);
-            return Ok([at_next, at_apex, at_previous]);
-        }
-        if tet.sides[from] & tet.sides[to] & tet.sides[3] != 0 {
-            return Ok([Corner::NONE; 3]);
-        }
-        if met.is_there[face] {
-            return Err(MeshFault::DuplicateFace { face: [from, to, 3].map(|corner| tet.corners[corner].0) });
-        }
-        let normal = side_normal(vertices, tet, [from, to, 3]);
-        let before = Before { tet: tet.number, label: tet.label, opposite: tet.corners[face] };
-        let opened = self.insert([lists[from], lists[to], lists[3]], normal, before);
-        Ok([opened, opened.next(), opened.previous()])
-    }
-
-    /// Pairs what lies beyond both faces at the edge from the gate's corner `place` to the apex: `towards` has the edge so,
-    /// `from` the other way.
-    #[inline(always)]
-    fn join_spoke(
-        &mut self,
-        tet: &NewTet,
-        met: &Met,
-        (place, towards, from): (usize, usize, usize),
-        beyond: &[Beyond; 3],
-    ) {
-        let (one, other) = (beyond[towards][1], beyond[from][2]);
-        let are_closed = [met.closed[towards].is_some(), met.closed[from].is_some()];
-        if met.spokes[place].is_some() && are_closed == [false; 2] {
-            self.pair_crosswise(tet.corners[place], met.spokes[place], one, other);
-        } else {
-            let is_filled = are_closed[0] & are_closed[1] & (one == met.closed[from].previous());
-            let pick = |edge| if is_filled { Corner::NONE } else { edge };
-            self.pair(pick(one), pick(other));
-        }
-    }
-
-    /// Pairs the edges of two new faces, the one from `start` on and the one that runs back, with those of two faces that
-    /// were there: `known` is one of them.
-    #[cold]
-    fn pair_crosswise(&mut self, start: VertexId, known: Corner, one: Corner, other: Corner) {
-        let partner = self.across(known);
-        let (along, back) = if self.vertex(known) == start { (known, partner) } else { (partner, known) };
-        self.pair(one, back);
-        self.pair(other, along);
     }
 }
 
-/// The normal of a tet's face with these corners.
+/// Takes out the open face that a face of a tet closes, or opens that face unless it lies on the box: it has the gate's
+/// edge `from`, `to` and the apex. Returns what lies beyond.
 #[inline(always)]
-fn side_normal(vertices: &Vertices, tet: &NewTet, [a, b, c]: [usize; 3]) -> Vec3 {
-    let extent = extents::around(vertices, [tet.corners[a], tet.corners[b], tet.corners[c]]);
-    unit_normal(plane([tet.positions[a], tet.positions[b], tet.positions[c]]), extent)
+fn pass_side(
+    rows: &mut [Row],
+    normals: &mut [Vec3A],
+    free: &mut Vec<u32>,
+    tet: &NewTet,
+    met: &Met,
+    (face, from, to): (usize, usize, usize),
+) -> Result<Beyond, MeshFault> {
+    let closed = met.closed[face];
+    if closed.is_some() {
+        let [at_apex, at_next, at_previous] = unlist(rows, closed);
+        free.push(closed.face() as u32);
+        return Ok([at_next, at_apex, at_previous]);
+    }
+    if tet.sides[from] & tet.sides[to] & tet.sides[3] != 0 {
+        return Ok([Corner::NONE; 3]);
+    }
+    if met.is_there[face] {
+        return Err(MeshFault::DuplicateFace { face: [from, to, 3].map(|corner| tet.corners[corner].0) });
+    }
+    let extent = extents::around([tet.extents[from], tet.extents[to], tet.extents[3]]);
+    let normal = unit_normal(cross(tet.edges[from], tet.edges[to]), extent);
+    let before = Before { tet: tet.number, label: tet.label, opposite: tet.corners[face] };
+    let corners = [from, to, 3].map(|corner| (tet.corners[corner], tet.ends[corner]));
+    let opened = open(rows, normals, free, corners, normal, before);
+    Ok([opened, Corner(opened.0 + 1), Corner(opened.0 + 2)])
+}
+
+/// Adds an open face in place of one that is free: its vertices, each with the end of its list, and its normal. Its edges
+/// have no partners yet. Returns its first corner.
+#[inline(always)]
+fn open(
+    rows: &mut [Row],
+    normals: &mut [Vec3A],
+    free: &mut Vec<u32>,
+    [a, b, c]: [(VertexId, Corner); 3],
+    normal: Vec3A,
+    before: Before,
+) -> Corner {
+    let first = Corner::first_of(free.pop().unwrap_or_default());
+    normals[first.face()] = normal;
+    let (second, third) = (Corner(first.0 + 1), Corner(first.0 + 2));
+    rows.as_chunks_mut::<4>().0[first.face()] =
+        [enlist(rows, first, a), enlist(rows, second, b), enlist(rows, third, c), before.to_row()];
+    first
+}
+
+/// Pairs what lies beyond both faces at the edge from the gate's corner `place` to the apex: `towards`
+/// has the edge so, `from` the other way.
+#[inline(always)]
+fn join_spoke(
+    rows: &mut [Row],
+    tet: &NewTet,
+    met: &Met,
+    (place, towards, from): (usize, usize, usize),
+    beyond: &[Beyond; 3],
+) {
+    let (one, other) = (beyond[towards][1], beyond[from][2]);
+    let (is_closed, is_other_closed) = (met.closed[towards].is_some(), met.closed[from].is_some());
+    if is_closed | is_other_closed {
+        if !(is_closed & is_other_closed & (one == met.closed[from].previous())) {
+            pair(rows, one, other);
+        }
+    } else if met.spokes[place].is_some() {
+        pair_crosswise(rows, tet.corners[place], met.spokes[place], one, other);
+    } else {
+        // What is left around the edge of a tet is more than 180 degrees.
+        pair_as(rows, one, other, WIDE);
+    }
+}
+
+/// Pairs the edges of two new faces, the one from `start` on and the one that runs back, with those of two faces that were
+/// there: `known` is one of them.
+#[cold]
+fn pair_crosswise(rows: &mut [Row], start: VertexId, known: Corner, one: Corner, other: Corner) {
+    let Row { across: partner, .. } = rows[known.index()];
+    let (along, back) = if rows[known.index()].vertex() == start { (known, partner) } else { (partner, known) };
+    pair(rows, one, back);
+    pair(rows, other, along);
 }
 
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
 
+    use glam::IVec3;
+
     use super::*;
+    use crate::bitstream::normals::point;
     use crate::mesh::FACES;
 
     const CELLS: i32 = 3;
@@ -335,7 +365,7 @@ mod tests {
         // Miri is a thousand times slower.
         left.truncate(if cfg!(miri) { 20 } else { left.len() });
         let (mut front, mut vertices) = (Front::new(), Vertices::default());
-        positions.iter().for_each(|&position| vertices.push(position, 0, front.push_list()));
+        positions.iter().for_each(|&position| vertices.push(point(position), 0, front.push_list()));
         let mut expected = BTreeSet::new();
         while !left.is_empty() {
             let corners = left.swap_remove(random(left.len()));
@@ -346,18 +376,24 @@ mod tests {
             });
             let [a, b, c, d] = corners;
             let corners = behind.map_or([a, b, c, d], |(corners, _)| corners);
+            let [at_a, at_b, at_c, at_apex] = corners.map(|v| vertices.position(v));
             let tet = NewTet {
                 number: 0,
                 label: 0,
                 corners,
-                positions: corners.map(|v| vertices.position(v)),
                 sides: [0; 4],
+                ends: corners.map(|v| vertices[v].open),
+                extents: [Vec3A::ONE; 4],
+                edges: [at_a, at_b, at_c].map(|corner| corner - at_apex),
             };
             let (gate, met) = match behind {
-                Some((_, gate)) => (gate, front.meet(&vertices, corners, gate)),
-                None => (front.sow(&vertices, &tet), Met::NOTHING),
+                Some((corners, gate)) => (gate, front.meet(&vertices, &Gate::new(&front, &vertices, gate), corners[3])),
+                None => (front.sow(&tet), Met::NOTHING),
             };
-            front.cover(&vertices, &tet, gate, &met).expect("faces that are not there");
+            for (one, other) in corners.into_iter().flat_map(|one| corners.map(|other| (one, other))) {
+                vertices[one].linked = vertices[one].linked.with(Linked::one(other));
+            }
+            front.cover(&tet, gate, &met).expect("faces that are not there");
             for face in FACES {
                 let [a, b, c] = face.map(|corner| corners[corner]);
                 if !expected.remove(&turned([a, c, b])) {

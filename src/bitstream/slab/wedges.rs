@@ -6,8 +6,8 @@ use crate::bitstream::MeshFault;
 use glam::Vec3;
 
 use crate::bitstream::colors::{Around, KnownColor, code_color, from_grains};
-use crate::bitstream::extents::size_of;
-use crate::bitstream::front::Met;
+use crate::bitstream::extents::size;
+use crate::bitstream::front::{Corner, Met};
 use crate::bitstream::labels::SameContext;
 use crate::bitstream::vertices::Wedges;
 use crate::mesh::{VertexId, Wedge, WedgeId};
@@ -116,7 +116,7 @@ impl Slab {
     }
 
     /// The tet's wedges; those that do not exist yet are made.
-    #[inline]
+    #[inline(always)]
     pub(super) fn code_wedges(
         &mut self,
         side: &mut impl Side,
@@ -163,17 +163,13 @@ impl Slab {
     }
 
     /// Labels before the faces that a tet closes but for the gate.
-    #[inline]
     pub(super) fn closed_labels(&self, met: &Met) -> [Option<u32>; 3] {
-        if self.labels == 1 {
-            return met.closed.map(|face| face.is_some().then_some(0));
-        }
         met.closed.map(|face| face.is_some().then(|| self.front.before(face).label))
     }
 
     /// Notes which wedges of a tet are neighbours from now on: those of edges that no tet before it has, as far as the
     /// faces tell that it closes; `closed` are the labels before them.
-    #[inline]
+    #[inline(never)]
     pub(super) fn note_neighbours(&mut self, wedges: [WedgeId; 4], label: u32, closed: &[Option<u32>; 4]) {
         let mut known = 0;
         for (closed, edges) in closed.iter().zip(FACE_EDGES) {
@@ -187,12 +183,23 @@ impl Slab {
         }
     }
 
+    /// The same of a tet behind a gate where there is one label: the edges to the apex that no closed face has.
+    #[inline(always)]
+    pub(super) fn note_spokes(&mut self, [a, b, c, apex]: [WedgeId; 4], met: &Met) {
+        let [first, second, third] = met.closed.map(Corner::is_some);
+        for (wedge, is_known) in [(a, second | third), (b, third | first), (c, first | second)] {
+            if !is_known {
+                self.neighbours.push(wedge.0, apex.0);
+            }
+        }
+    }
+
     /// Codes the colours of all wedges that have none yet.
     pub(super) fn code_colors(&mut self, side: &mut impl Side) -> Result<(), MeshFault> {
         for wedge in self.known.len()..self.mesh.wedges.len() {
             side.check()?;
             let around = self.around(wedge);
-            let step = self.color_steps.at(size_of(self.vertices[self.mesh.wedges[wedge].vertex].extent));
+            let step = self.color_steps.at(size(self.vertices[self.mesh.wedges[wedge].vertex].extent));
             let truth = side.color(wedge, step);
             let (color, misses) = code_color(side, &mut self.models.colors, &around, step, truth)?;
             self.mesh.wedges[wedge].color = from_grains(color);
