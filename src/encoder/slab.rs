@@ -1,5 +1,6 @@
 //! One slab through the sliding window (§VI): lattice, cleave, simplify, commit, fit, write.
 
+mod labels;
 mod refits;
 
 use std::collections::VecDeque;
@@ -16,9 +17,7 @@ use crate::mesh::{Domain, StarTable, TetMesh};
 use crate::vectorize::fit::{FitParams, FitReport, FitRequest, fit};
 use crate::vectorize::lattice::AdaptiveLattice;
 use crate::vectorize::segment::Flatness;
-use crate::vectorize::simplify::{
-    BlockGoal, Goal, SimplifyParams, Topology, Unfrozen, WedgeQuadric, WorkMesh, simplify,
-};
+use crate::vectorize::simplify::{BlockGoal, Goal, SimplifyParams, Unfrozen, WedgeQuadric, WorkMesh, simplify};
 use crate::video::{Frame, LabelPlane, Volume};
 
 /// Vertices a pixel of one frame that the transition from the sparse window to its dense leading layer may have.
@@ -30,12 +29,6 @@ const RUN_RATIO: f64 = 2.0;
 
 /// The same where labels differ: what blocks have frozen, planes dense with borders, lets less of them go cheaply.
 const CUT_RUN_RATIO: f64 = 4.0;
-
-/// [`SimplifyParams::improve_at`] where labels differ.
-const CUT_IMPROVE_AT: f32 = 0.7;
-
-/// One frame in so many says how flat labels are.
-const FLATNESS_EVERY: u32 = 4;
 
 /// How many times the vertices that a window is to have it may grow to before its blocks are simplified.
 const GROWTH: f64 = 1.5;
@@ -172,7 +165,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             flatness: Flatness::default(),
             simplify_params: SimplifyParams {
                 max_extent_frames: config.window,
-                topology: topology(config.topology, false),
+                topology: labels::topology(config.topology, false),
                 // Made of colour errors, so no measure for distances.
                 surface_weight: match config.error_metric {
                     ErrorMetric::Color => SimplifyParams::default().surface_weight,
@@ -201,18 +194,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     }
 
     fn take(&mut self, frame: Arc<Frame>, labels: LabelPlane) {
-        let is_first_cut = !self.is_cut && !labels.is_uniform();
-        if is_first_cut {
-            self.is_cut = true;
-            self.simplify_params.topology = topology(self.topology, true);
-            self.simplify_params.improve_at = CUT_IMPROVE_AT;
-        }
-        if is_first_cut || (self.is_cut && self.planes.is_multiple_of(FLATNESS_EVERY)) {
-            self.flatness.look(&frame, &labels);
-            let factor = self.flatness.factor();
-            self.fit_params.gradient_factor = factor;
-            self.simplify_params.spread_weight = factor * SimplifyParams::default().spread_weight;
-        }
+        self.follow_labels(&frame, &labels);
         self.volume.push(frame.clone());
         self.labels.push_back((self.planes, labels.clone()));
         self.runs.push(frame, labels);
@@ -461,16 +443,6 @@ impl<Q: WedgeQuadric> WindowEncoder for SlabEncoder<Q> {
         let packets = self.advance(Some(frames), observer)?;
         let vertices = self.committed.positions.len() as u64;
         Ok(FinishedSlab { packets, vertices, error_gain: self.error_gain, error: self.proof.error() })
-    }
-}
-
-/// What is kept of the topology of labels, as far as there are any.
-fn topology(rule: TopologyRule, is_cut: bool) -> Topology {
-    match rule {
-        // Of one label there is no more to keep than positive tets keep.
-        TopologyRule::Auto if is_cut => Topology::Priced,
-        TopologyRule::Auto | TopologyRule::Free => Topology::Free,
-        TopologyRule::Strict => Topology::Strict,
     }
 }
 

@@ -10,17 +10,12 @@ use super::legality::{Form, Limits};
 use super::quadric::WedgeQuadric;
 use super::work_mesh::WorkMesh;
 
-/// Rounds of swaps and moves.
-const ROUNDS: usize = 2;
-
 impl<Q: WedgeQuadric> WorkMesh<Q> {
     /// Swaps edges and moves vertices inside of labels where that makes the worst tet around better, and changes colours by no more
     /// than `price` (squared levels times cubic pixels). Stars and places must be there.
     pub(super) fn improve(&mut self, unfrozen: Unfrozen, limits: &Limits, price: f32) {
-        for _ in 0..ROUNDS {
-            self.swap(limits, price);
-            self.relax(unfrozen, limits, price);
-        }
+        self.swap(limits, price);
+        self.relax(unfrozen, limits, price);
     }
 
     /// The quality of a tet, the cube of its mean ratio: between 0 and 1, negative where it is not allowed.

@@ -93,7 +93,8 @@ impl<Q: WedgeQuadric> Swapper<'_, Q> {
     fn find_ring(&mut self, u: u32, v: u32) -> bool {
         let Self { mesh, old, ring, .. } = self;
         old.clear();
-        old.extend(mesh.stars.star(u).iter().copied().filter(|&tet| mesh.tets[tet as usize].contains(&v)));
+        let (near, far) = if mesh.stars.star(u).len() <= mesh.stars.star(v).len() { (u, v) } else { (v, u) };
+        old.extend(mesh.stars.star(near).iter().copied().filter(|&tet| mesh.tets[tet as usize].contains(&far)));
         let count = old.len();
         let is_alike = old.iter().all(|&tet| mesh.labels[tet as usize] == mesh.labels[old[0] as usize]);
         if !(3..=MOST_RING).contains(&count) || !is_alike {
@@ -117,7 +118,9 @@ impl<Q: WedgeQuadric> Swapper<'_, Q> {
     fn pierce(&mut self, tet: u32, face: [u32; 3]) -> bool {
         let mesh = &*self.mesh;
         let holds = |&&other: &&u32| other != tet && face.iter().all(|v| mesh.tets[other as usize].contains(v));
-        let Some(&other) = mesh.stars.star(face[0]).iter().find(holds) else { return false };
+        let stars = face.map(|v| mesh.stars.star(v));
+        let smallest = stars.into_iter().min_by_key(|star| star.len()).unwrap_or_default();
+        let Some(&other) = smallest.iter().find(holds) else { return false };
         if mesh.labels[other as usize] != mesh.labels[tet as usize] {
             return false;
         }

@@ -1,0 +1,44 @@
+//! Settings of a slab's stages that follow from its labels.
+//!
+//! In: frames with labels, as they come. Out: what simplification and fit are to do about labels. Forbidden here: calling a stage.
+
+use super::SlabEncoder;
+use crate::encoder::TopologyRule;
+use crate::vectorize::simplify::{SimplifyParams, Topology, WedgeQuadric};
+use crate::video::{Frame, LabelPlane};
+
+/// [`SimplifyParams::improve_at`] where labels differ.
+const CUT_IMPROVE_AT: f32 = 0.7;
+
+/// One frame in so many says how flat labels are.
+const FLATNESS_EVERY: u32 = 4;
+
+impl<Q: WedgeQuadric> SlabEncoder<Q> {
+    /// Takes in the labels of the next frame.
+    pub(super) fn follow_labels(&mut self, frame: &Frame, labels: &LabelPlane) {
+        let is_first_cut = !self.is_cut && !labels.is_uniform();
+        self.is_cut |= is_first_cut;
+        if !is_first_cut && !(self.is_cut && self.planes.is_multiple_of(FLATNESS_EVERY)) {
+            return;
+        }
+        self.flatness.look(frame, labels);
+        let factor = self.flatness.factor();
+        self.fit_params.gradient_factor = factor;
+        self.simplify_params.topology = topology(self.topology, self.is_cut);
+        // The paper's simplification, strict or free, knows no more than collapses.
+        if self.topology == TopologyRule::Auto {
+            self.simplify_params.improve_at = CUT_IMPROVE_AT;
+            self.simplify_params.spread_weight = factor * SimplifyParams::default().spread_weight;
+        }
+    }
+}
+
+/// What is kept of the topology of labels, as far as there are any.
+pub(super) fn topology(rule: TopologyRule, is_cut: bool) -> Topology {
+    match rule {
+        // Of one label there is no more to keep than positive tets keep.
+        TopologyRule::Auto if is_cut => Topology::Priced,
+        TopologyRule::Auto | TopologyRule::Free => Topology::Free,
+        TopologyRule::Strict => Topology::Strict,
+    }
+}
