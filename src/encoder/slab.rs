@@ -116,7 +116,7 @@ pub(super) struct SlabEncoder<Q> {
     topology: TopologyRule,
     /// Whether labels differ anywhere so far.
     is_cut: bool,
-    /// Of its labels, looked at in one frame of [`FLATNESS_EVERY`].
+    /// Of its labels, looked at in one frame of [`labels::FLATNESS_EVERY`].
     flatness: Flatness,
     simplify_params: SimplifyParams,
     fit_params: FitParams,

@@ -5,6 +5,9 @@ use super::{TetMesh, VertexId};
 /// Local corners of the four faces of a positive tet; face i is opposite corner i and seen anticlockwise from outside.
 pub const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
+/// The edges of a tet, by its corners.
+pub const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
 /// Tets around each vertex, as compressed rows; tets ascend within a row.
 #[derive(Debug, Clone)]
 pub struct StarTable {

@@ -11,7 +11,7 @@ mod predicates;
 mod tet_mesh;
 mod validate;
 
-pub use adjacency::{FACES, StarTable};
+pub use adjacency::{EDGES, FACES, StarTable};
 pub use domain::{Domain, Sides};
 pub(crate) use face_map::FaceMap;
 pub use ids::{VertexId, WedgeId};

@@ -1,9 +1,8 @@
 //! A tet's eight children over its ten nodes, and which diagonal splits the octahedron between them (§V, Fig. 4a).
+//!
+//! Nodes 0 to 3 of a parent are its corners, node 4 + i is the point of its edge i ([`EDGES`](crate::mesh::EDGES)).
 
 use glam::{I64Vec3, IVec3};
-
-/// Ends of the six edges of a tet; node 4 + i of a parent's ten is the point of edge i, nodes 0 to 3 are its corners.
-pub(super) const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 /// The children for each diagonal, over a parent's ten nodes: first the four at the corners, then the four around the
 /// diagonal. All are positive where the parent is and nothing was smoothed.
@@ -39,7 +38,7 @@ pub(super) fn diagonal(corners: [IVec3; 4]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::volume6;
+    use crate::mesh::{EDGES, volume6};
 
     fn ten(corners: [IVec3; 4]) -> [IVec3; 10] {
         let middle = EDGES.map(|[i, j]| (corners[i] + corners[j]) / 2);

@@ -3,9 +3,8 @@
 //! In: a complex that grows at its ends. Out: four bits a tet. The faces of a child lie on those of its parent or
 //! inside it, so what is known of control tets says all about every level ([`child_faces`]).
 
-use super::children::EDGES;
 use super::complex::Complex;
-use crate::mesh::{FACES, FaceMap, VertexId};
+use crate::mesh::{EDGES, FACES, FaceMap, VertexId};
 
 /// Bits of a tet's faces; bit i: the face that lacks corner i.
 pub(super) type Faces = u8;

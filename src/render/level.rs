@@ -2,10 +2,11 @@
 
 use glam::{I64Vec3, IVec3};
 
-use super::children::{CHILDREN, EDGES, diagonal};
+use super::children::{CHILDREN, diagonal};
 use super::complex::{Complex, Node, Stars};
 use super::parallel::map_chunks;
 use super::rings::{Gather, NodeMask};
+use crate::mesh::EDGES;
 
 /// Vertices gathered in one go: enough to outweigh handing the work to a thread.
 const CHUNK: usize = 2048;

@@ -6,11 +6,12 @@
 
 use glam::{IVec3, Vec3, Vec3A};
 
-use super::children::{CHILDREN, EDGES, diagonal};
+use super::children::{CHILDREN, diagonal};
 use super::complex::{Complex, Stars};
 use super::level::{blend, place};
 use super::parallel::map_chunks;
 use super::rings::{Gather, NodeMask};
+use crate::mesh::EDGES;
 
 /// Vertices or tets that a thread takes at a time.
 const CHUNK: usize = 512;

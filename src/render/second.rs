@@ -5,9 +5,9 @@
 
 use glam::IVec3;
 
-use super::children::EDGES;
 use super::complex::{Complex, Node};
 use super::refiner::{NodeName, Refiner};
+use crate::mesh::EDGES;
 
 const NONE: u32 = u32::MAX;
 

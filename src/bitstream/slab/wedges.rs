@@ -10,7 +10,7 @@ use crate::bitstream::extents::size;
 use crate::bitstream::front::{Corner, Met};
 use crate::bitstream::labels::SameContext;
 use crate::bitstream::vertices::Wedges;
-use crate::mesh::{VertexId, Wedge, WedgeId};
+use crate::mesh::{EDGES, VertexId, Wedge, WedgeId};
 use crate::video::Label;
 
 use super::{Side, Slab};
@@ -24,10 +24,7 @@ const LABEL_SCAN: usize = 8;
 /// Neighbours of a wedge that its colour is predicted from, at most.
 const NEIGHBOUR_SCAN: usize = 256;
 
-/// The edges of a tet, by its corners.
-const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
-
-/// All of them, as bits.
+/// All edges of a tet, as bits.
 const ALL_EDGES: u8 = 0b111111;
 
 /// Which of them each face has, as bits.

@@ -6,7 +6,7 @@
 use glam::{IVec3, Vec3};
 
 use super::parallel;
-use crate::mesh::{Domain, StarTable, TetMesh, VertexId, volume6};
+use crate::mesh::{StarTable, TetMesh, VertexId, volume6};
 
 /// Checks and makes moves of the vertices of one mesh.
 pub(super) struct Guard {
@@ -80,7 +80,7 @@ impl Guard {
 
 /// The position, `step` away, that stays on the sides of the box where `position` is, and off the others.
 fn target(mesh: &TetMesh, position: IVec3, step: Vec3) -> IVec3 {
-    let held = step * free_components(&mesh.domain, position);
+    let held = step * mesh.domain.sides(position).free_axes();
     let inside = IVec3::ONE.min(position);
     (position + held.round().as_ivec3()).clamp(inside, (mesh.domain.extent() - IVec3::ONE).max(position))
 }
@@ -107,12 +107,6 @@ fn classes(stars: &StarTable, corners: &[[VertexId; 4]], vertices: usize) -> Vec
         classes[class].push(VertexId(v));
     }
     classes
-}
-
-/// 1 for the coordinates that a vertex may change, 0 for those that a side of the box holds.
-pub(super) fn free_components(domain: &Domain, position: IVec3) -> Vec3 {
-    let on_side = position.cmpeq(IVec3::ZERO) | position.cmpeq(domain.extent());
-    Vec3::select(on_side, Vec3::ZERO, Vec3::ONE)
 }
 
 /// At most the smallest altitude of a tet, in lattice units, at a fraction of the cost; not positive if it is flat or

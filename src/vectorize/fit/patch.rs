@@ -5,7 +5,6 @@
 
 use glam::Vec3;
 
-use super::guard::free_components;
 use crate::mesh::{FACES, TetMesh, VertexId, Wedge, WedgeId};
 
 /// A mesh cut out around some vertices. Vertices, wedges and tets keep the order they have in the whole mesh.
@@ -114,7 +113,7 @@ impl Patch {
     /// 1 for the coordinates of a vertex that may change, 0 for others.
     pub(super) fn movable_components(&self, vertex: usize) -> Vec3 {
         match self.movable[vertex] {
-            true => free_components(&self.mesh.domain, self.mesh.positions[vertex]),
+            true => self.mesh.domain.sides(self.mesh.positions[vertex]).free_axes(),
             false => Vec3::ZERO,
         }
     }

@@ -11,10 +11,10 @@ use glam::{IVec3, Vec3};
 use super::axis::{Axis, CELL};
 use super::bisect::{Bisection, Leaves};
 use super::importance::Importance;
-use super::labels::{Crossing, LayerLabels};
+use super::labels::{Crossing, LayerLabels, step_between};
 use super::samples::{Grid, LEVELS, pyramid};
 use super::{LatticeError, check};
-use crate::mesh::Domain;
+use crate::mesh::{Domain, EDGES};
 use crate::vectorize::parallel::map;
 use crate::video::{Edges, Frame, Label, LabelPlane};
 
@@ -216,7 +216,7 @@ impl Layer {
     fn cuts(&self, leaves: &[Leaves], numbers: &[u32]) -> Vec<EdgeCut> {
         let LayerLabels::Mixed(labels) = &self.labels else { return Vec::new() };
         let mixed = leaves.iter().flat_map(|part| &part.tets).filter(|tet| self.is_mixed(tet));
-        let edges = mixed.flat_map(|&[a, b, c, d]| [[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]]);
+        let edges = mixed.flat_map(|tet| EDGES.map(|ends| ends.map(|end| tet[end])));
         let mut edges: Vec<[u32; 2]> = edges.map(|[a, b]| [a.min(b), a.max(b)]).collect();
         edges.sort_unstable();
         edges.dedup();
@@ -242,8 +242,7 @@ impl Layer {
     fn along(&self, ends: [[usize; 3]; 2], crossing: &Crossing, share: f32) -> f32 {
         let axis = (0..3).find(|&axis| ends[0][axis].abs_diff(ends[1][axis]) == crossing.steps).unwrap_or(0);
         let lines = self.axes[axis].lines();
-        let [start, end] = ends.map(|end| end[axis]);
-        let place = |n: usize| lines[(start * (crossing.steps - n) + end * n) / crossing.steps].place as f32;
+        let place = |n: usize| lines[step_between(ends.map(|end| end[axis]), n, crossing.steps)].place as f32;
         let [before, after] = [crossing.before, crossing.before + 1].map(place);
         (before + share * (after - before) - place(0)) / (place(crossing.steps) - place(0))
     }

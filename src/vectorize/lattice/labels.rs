@@ -158,13 +158,18 @@ impl MixedLabels {
         if labels[0] == labels[1] {
             return None;
         }
-        let sample = |n: usize| std::array::from_fn(|axis| (start[axis] * (steps - n) + end[axis] * n) / steps);
+        let sample = |n: usize| std::array::from_fn(|axis| step_between([start[axis], end[axis]], n, steps));
         let is_first = |n: usize| self.at(sample(n)) == labels[0];
         let count = (0..=steps).filter(|&n| is_first(n)).count();
         let before = (0..count).rev().find(|&n| is_first(n)).map_or(start, sample);
         let after = (count..steps).find(|&n| self.at(sample(n)) == labels[1]).map_or(end, sample);
         Some(Crossing { before: count - 1, steps, samples: [before, after], labels })
     }
+}
+
+/// The line after `n` of so many steps from one line to another.
+pub(super) fn step_between([start, end]: [usize; 2], n: usize, steps: usize) -> usize {
+    (start * (steps - n) + end * n) / steps
 }
 
 #[cfg(test)]

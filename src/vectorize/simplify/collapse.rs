@@ -97,8 +97,6 @@ struct Simplifier<'a, Q> {
     known: Vec<[u32; 3]>,
     known_bits: u32,
     report: SimplifyReport,
-    /// Vertices that have not merged into others.
-    live: usize,
     star: Vec<u32>,
     /// For the link condition.
     marks: Marks,
@@ -132,7 +130,6 @@ pub fn simplify<Q: WedgeQuadric>(
     let vertices = mesh.vertices.len();
     let mut run = Simplifier {
         alias: (0..vertices as u32).collect(),
-        live: mesh.vertex_count(),
         mesh,
         unfrozen,
         goal,
@@ -215,10 +212,10 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
     fn collapse(&mut self) {
         let limit = BucketQueue::bucket(self.goal.max_cost);
         let mut collapses_before = u64::MAX;
-        let mut few = usize::MAX;
+        let mut due = 0;
         while !self.goal.is_reached(&self.report) {
-            if self.live < few {
-                few = self.improve();
+            if self.report.collapses >= due {
+                due = self.rank_anew();
             }
             let Some((bucket, entry)) = self.queue.pop() else {
                 // What was refused may have become possible, as long as something changed since.
@@ -241,9 +238,9 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
         }
     }
 
-    /// Makes room for collapses, where that is wanted, and ranks all edges anew. Returns the number of vertices below which it is
-    /// to be done again.
-    fn improve(&mut self) -> usize {
+    /// Ranks all edges, having made room for collapses where that is wanted. Returns after how many collapses of this run it is to
+    /// be done again.
+    fn rank_anew(&mut self) -> u64 {
         if self.params.improve_at > 0.0 {
             let price = self.params.improve_cost * self.report.max_cost;
             self.mesh.improve(self.unfrozen, &self.limits, price);
@@ -253,7 +250,9 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
         self.queue = BucketQueue::new();
         self.aside.clear();
         self.rank_edges();
-        (self.params.improve_at * self.live as f32) as usize
+        let live = self.mesh.vertex_count();
+        let few = (self.params.improve_at * live as f32) as usize;
+        self.report.collapses + (live.saturating_sub(few) + 1) as u64
     }
 
     /// The entry and where its collapse would lead, if its cost is current and its turn has come; an outdated one is
@@ -349,7 +348,6 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
         let keep_u = if handed_on(u) != handed_on(v) { handed_on(u) } else { larger };
         let (kept, gone) = if keep_u { (u, v) } else { (v, u) };
         self.report.collapses += 1;
-        self.live -= 1;
         self.report.max_cost = self.report.max_cost.max(proposal.cost);
         let times = [gone, kept].map(|w| self.mesh.vertices[w as usize].position.z);
         let count = |vertices: usize, end: i32| {

@@ -118,11 +118,10 @@ impl<Q: WedgeQuadric> Proposer<'_, Q> {
             }
             price = self.topology_price(u, v);
         }
-        let axis = |low: u8, high: u8| (sides.0 & (low | high) != 0).then_some(0.0);
         Ok(Merged {
             quadric: self.merged_quadric(u, v, bound),
             origin: mesh.vertices[bound as usize].position,
-            fixed: [axis(1, 2), axis(4, 8), axis(16, 32)],
+            fixed: sides.free_axes().to_array().map(|free| (free == 0.0).then_some(0.0)),
             stays: fixed_u || fixed_v || (price == 0.0 && self.keeps_place(u, v, bound)),
             price,
         })

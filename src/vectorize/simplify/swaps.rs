@@ -10,7 +10,7 @@ use glam::Vec3;
 use super::legality::{Form, Limits};
 use super::quadric::WedgeQuadric;
 use super::work_mesh::{NONE, WorkMesh};
-use crate::mesh::FACES;
+use crate::mesh::{EDGES, FACES};
 
 /// Most tets around an edge that is removed.
 const MOST_RING: usize = 7;
@@ -20,9 +20,6 @@ const GOOD: f32 = 0.1;
 const BETTER: f32 = 1.1;
 /// Quality of what there is none of.
 const BEST: f32 = 1.0;
-
-/// The edges of a tet.
-const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 impl<Q: WedgeQuadric> WorkMesh<Q> {
     /// Swaps where that changes colours by no more than `price` each time.
