@@ -208,9 +208,9 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let count = runs.len();
         for (n, Run { mesh, last, planes_a_frame }) in runs.into_iter().enumerate() {
             let goal = self.goal_of_run(&mesh, last - self.lead);
-            let report = observer.stage(Stage::Simplify, || {
-                self.work.append_simplified(&mesh, planes_a_frame, goal, &self.simplify_params)
-            });
+            let params = self.run_params();
+            let report =
+                observer.stage(Stage::Simplify, || self.work.append_simplified(&mesh, planes_a_frame, goal, &params));
             log::debug!("blocks: {report:?}");
             observer.tell(Event::Simplified(report));
             self.lead = last;

@@ -7,8 +7,12 @@ use crate::encoder::TopologyRule;
 use crate::vectorize::simplify::{SimplifyParams, Topology, WedgeQuadric};
 use crate::video::{Frame, LabelPlane};
 
-/// [`SimplifyParams::improve_at`] where labels differ.
-const CUT_IMPROVE_AT: f32 = 0.7;
+/// [`SimplifyParams::improve_at`] where labels differ, for the window: collapses jam most when few vertices are left. Flat
+/// between 0.8 and 0.95 (docs/benchmarks.md).
+const CUT_IMPROVE_AT: f32 = 0.9;
+
+/// The same for runs, which are dense: rounds take long and collapses are many.
+const RUN_IMPROVE_AT: f32 = 0.3;
 
 /// One frame in so many says how flat labels are.
 const FLATNESS_EVERY: u32 = 4;
@@ -23,13 +27,19 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         }
         self.flatness.look(frame, labels);
         let factor = self.flatness.factor();
-        self.fit_params.gradient_factor = factor;
+        self.fit_params.flatness = factor;
         self.simplify_params.topology = topology(self.topology, self.is_cut);
         // The paper's simplification, strict or free, knows no more than collapses.
         if self.topology == TopologyRule::Auto {
             self.simplify_params.improve_at = CUT_IMPROVE_AT;
             self.simplify_params.spread_weight = factor * SimplifyParams::default().spread_weight;
         }
+    }
+
+    /// How a run's blocks are simplified.
+    pub(super) fn run_params(&self) -> SimplifyParams {
+        let params = self.simplify_params;
+        SimplifyParams { improve_at: params.improve_at.min(RUN_IMPROVE_AT), ..params }
     }
 }
 

@@ -25,6 +25,7 @@ mod patch;
 mod pin;
 mod planes;
 mod polygon;
+mod pure;
 mod quarters;
 mod refine;
 mod smoothness;
@@ -48,6 +49,10 @@ use patch::Patch;
 /// Subdivision masks reach one ring, so what a free vertex has a share in lies within one ring of it, and is exact if
 /// the tets of the next ring are there.
 const RINGS: u8 = 2;
+
+/// What colours are held to when positions stay, of what holds them while positions move: then they must not make up for
+/// places, in the end they should. All of it in the end as well: 1.2 dB less at the source's size, 0.2 dB at eight times it.
+const FREE_ANCHOR: f32 = 0.05;
 
 /// Fits surfaces, colours and positions, pins folds and quantises colours.
 ///
@@ -114,7 +119,11 @@ impl<'a> Fitting<'a> {
         let params = request.params;
         let patch = Patch::around(request.mesh, request.free, RINGS);
         let model = Model::new(&patch.mesh, &patch.free, params.subdivision_levels);
-        let colors = Colors::new(patch.mesh.wedges.iter().map(|w| w.color).collect(), &patch.free_wedges());
+        let mut colors = Colors::new(patch.mesh.wedges.iter().map(|w| w.color).collect(), &patch.free_wedges());
+        if params.flatness > 1.0 {
+            let pure = pure::pure_colors(&patch.mesh, request.labels);
+            colors.anchor.iter_mut().zip(pure).for_each(|(anchor, pure)| *anchor = pure.unwrap_or(*anchor));
+        }
         let (frames, report) = (request.frames, FitReport::default());
         Ok(Self { patch, model, colors, frames, params, report, seen: None })
     }
@@ -138,7 +147,7 @@ impl<'a> Fitting<'a> {
         let evidence = self.look(Beside::default());
         self.report.pixels = evidence.pixels();
         self.report.rms_before = self.rms(&evidence);
-        self.colors.optimize(&self.model, &evidence, self.params.color_iterations, self.params);
+        self.colors.optimize(&self.model, &evidence, self.params.color_iterations, &self.anchored(FREE_ANCHOR));
         self.report.rms_colors = self.rms(&evidence);
         self.seen = Some(evidence);
     }
@@ -148,8 +157,8 @@ impl<'a> Fitting<'a> {
         let all = self.params.position_iterations;
         // What gradients cost would hold the vertices of long slivers, and with them the mesh: only what flat labels add
         // counts, without which the colours of thin ones would make up for places.
-        let gradient_weight = self.params.gradient_weight * (self.params.gradient_factor - 1.0);
-        let fine = FitParams { position_iterations: all - all / 2, gradient_weight, ..self.params.clone() };
+        let gradient_weight = self.params.gradient_weight * (self.params.flatness - 1.0);
+        let fine = FitParams { position_iterations: all - all / 2, gradient_weight, ..self.anchored(1.0) };
         let rough = FitParams { position_iterations: all / 2, quarter_weight: 0.0, ..fine.clone() };
         let guard = Guard::new(&self.patch.mesh, self.params.minimum_altitude);
         for params in [rough, fine].iter().filter(|params| params.position_iterations > 0) {
@@ -190,9 +199,9 @@ impl<'a> Fitting<'a> {
     fn final_colors(&mut self) {
         // Where positions stay nothing can fit the quarters.
         let quarter_weight = if self.params.position_iterations > 0 { self.params.quarter_weight } else { 0.0 };
-        let gradient = self.params.gradient_weight * self.params.gradient_factor;
+        let gradient = self.params.gradient_weight * self.params.flatness;
         let evidence = self.look(Beside { quarter: quarter_weight, gradient });
-        self.colors.optimize(&self.model, &evidence, self.params.color_iterations, self.params);
+        self.colors.optimize(&self.model, &evidence, self.params.color_iterations, &self.anchored(FREE_ANCHOR));
         self.report.rms_after = self.rms(&evidence);
         let points = self.model.points(&self.patch.mesh.positions);
         self.report.rms_within_tets = evidence.error_within_tets(&self.model, &points, &self.colors.now);
@@ -202,6 +211,12 @@ impl<'a> Fitting<'a> {
         self.patch.mesh.wedges.iter_mut().zip(&self.colors.now).for_each(|(wedge, color)| wedge.color = *color);
         self.patch.write_back(mesh);
         self.report
+    }
+
+    /// With the anchors of colours that flat labels ask for, or a share of it.
+    fn anchored(&self, share: f32) -> FitParams {
+        let params = self.params;
+        FitParams { color_anchor: params.color_anchor * (1.0 + share * (params.flatness - 1.0)), ..params.clone() }
     }
 
     /// Level 0 is drawn as it is, whatever would fold at others.

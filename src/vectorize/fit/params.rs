@@ -38,8 +38,9 @@ pub struct FitParams {
     /// What the squared gradient of colour, in (levels / pixel)^2, costs over a pixel and a frame beside the squared error
     /// there, when colours are fitted for the last time: it decides where no pixel does. 0: nothing.
     pub gradient_weight: f32,
-    /// How many times this counts, from 1 on: more where labels are flat ([`crate::vectorize::segment::Flatness`]).
-    pub gradient_factor: f32,
+    /// How flat labels are, from 1 on ([`crate::vectorize::segment::Flatness`]): how many times gradients cost that, and how
+    /// many times wedges count that have the pure colours of their labels, where these are known.
+    pub flatness: f32,
 
     /// Steps of the position optimisation; 0: positions stay.
     pub position_iterations: u32,
@@ -71,7 +72,7 @@ impl Default for FitParams {
             color_anchor: 0.05,
             quarter_weight: 0.2,
             gradient_weight: 0.003,
-            gradient_factor: 1.0,
+            flatness: 1.0,
             position_iterations: 12,
             position_cg_iterations: 1,
             position_stiffness: 1.0,
@@ -102,8 +103,8 @@ impl FitParams {
         for (field, value) in not_negative {
             expect(field, "a finite number >= 0", value, value.is_finite() && value >= 0.0)?;
         }
-        let factor = self.gradient_factor;
-        expect("gradient_factor", "a finite number >= 1", factor, factor.is_finite() && factor >= 1.0)?;
+        let flatness = self.flatness;
+        expect("flatness", "a finite number >= 1", flatness, flatness.is_finite() && flatness >= 1.0)?;
         let anchored = self.color_anchor.is_finite() && self.color_anchor > 0.0;
         expect("color_anchor", "a finite number > 0", self.color_anchor, anchored)
     }

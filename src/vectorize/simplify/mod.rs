@@ -45,7 +45,7 @@ pub struct SimplifyParams {
     /// that it is about, over so many cubic pixels. Flat between 0.1 and 1 (docs/benchmarks.md).
     pub topology_price: f32,
     /// Whenever this part of the vertices is left, tets inside of labels are improved: most collapses are refused since tets that
-    /// nothing is seen of would turn over. 0: never. Flat between 0.7 and 0.85 (docs/benchmarks.md).
+    /// nothing is seen of would turn over. 0: never.
     pub improve_at: f32,
     /// What a swap or a move that does this may cost, over the greatest cost of a collapse so far.
     pub improve_cost: f32,

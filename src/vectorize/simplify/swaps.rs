@@ -24,7 +24,13 @@ const BEST: f32 = 1.0;
 impl<Q: WedgeQuadric> WorkMesh<Q> {
     /// Swaps where that changes colours by no more than `price` each time.
     pub(super) fn swap(&mut self, limits: &Limits, price: f32) {
-        let mut swapper = Swapper { mesh: self, limits, price, old: Vec::new(), ring: Vec::new(), new: Vec::new() };
+        let quality = |&corners: &[u32; 4]| match corners {
+            [NONE, ..] => BEST,
+            corners => self.quality(corners.map(|v| self.places[v as usize]), limits),
+        };
+        let qualities = self.tets.iter().map(quality).collect();
+        let (old, ring, new) = Default::default();
+        let mut swapper = Swapper { mesh: self, limits, price, qualities, old, ring, new };
         for tet in 0..swapper.mesh.tets.len() {
             swapper.improve(tet as u32);
         }
@@ -35,6 +41,8 @@ struct Swapper<'a, Q> {
     mesh: &'a mut WorkMesh<Q>,
     limits: &'a Limits,
     price: f32,
+    /// Of each tet.
+    qualities: Vec<f32>,
     /// The tets of a swap, by number.
     old: Vec<u32>,
     /// The vertices around their edge, in the order in which the edge, a vertex and the next make a positive tet.
@@ -46,12 +54,12 @@ struct Swapper<'a, Q> {
 impl<Q: WedgeQuadric> Swapper<'_, Q> {
     /// Makes the first swap that is worth it for a tet that is not good.
     fn improve(&mut self, tet: u32) {
-        let corners = self.mesh.tets[tet as usize];
-        if corners[0] == NONE || self.quality(corners) >= GOOD {
+        if self.qualities[tet as usize] >= GOOD {
             return;
         }
+        let corners = self.mesh.tets[tet as usize];
         for edge in EDGES {
-            if self.remove_edge(edge.map(|n| corners[n])) {
+            if self.remove_edge(tet, edge.map(|n| corners[n])) {
                 return;
             }
         }
@@ -66,12 +74,18 @@ impl<Q: WedgeQuadric> Swapper<'_, Q> {
         self.mesh.quality(corners.map(|v| self.mesh.places[v as usize]), self.limits)
     }
 
-    /// Removes an edge if other tets in its place are better.
-    fn remove_edge(&mut self, [u, v]: [u32; 2]) -> bool {
+    /// Removes an edge if other tets in its place are better than `tet`, the worst there.
+    fn remove_edge(&mut self, tet: u32, [u, v]: [u32; 2]) -> bool {
         if !self.find_ring(u, v) {
             return false;
         }
-        let before = self.old.iter().map(|&tet| self.quality(self.mesh.tets[tet as usize])).fold(BEST, f32::min);
+        let before = self.qualities[tet as usize];
+        if self.old.iter().any(|&other| self.qualities[other as usize] < before) {
+            return false;
+        }
+        if self.change_of_colors(self.ring.iter().copied().chain([u, v])) > self.price {
+            return false;
+        }
         let triangulation =
             Triangulation::of_ring(&self.ring, |[a, b, c]| self.quality([u, a, b, c]).min(self.quality([a, v, b, c])));
         if triangulation.worst() <= BETTER * before.max(0.0) {
@@ -83,7 +97,8 @@ impl<Q: WedgeQuadric> Swapper<'_, Q> {
             let [a, b, c] = triangle.map(|n| ring[n]);
             new.extend([[u, a, b, c], [a, v, b, c]]);
         });
-        self.replace()
+        self.replace();
+        true
     }
 
     /// Finds the tets and the vertices around an edge, if they are few, of one label, and go all around.
@@ -123,7 +138,7 @@ impl<Q: WedgeQuadric> Swapper<'_, Q> {
         }
         let [own, across] = [tet, other].map(|tet| mesh.tets[tet as usize]);
         let Some(&apex) = across.iter().find(|v| !face.contains(v)) else { return false };
-        let before = self.quality(own).min(self.quality(across));
+        let before = self.qualities[tet as usize].min(self.qualities[other as usize]);
         self.new.clear();
         self.new.extend(face.map(|gone| own.map(|v| if v == gone { apex } else { v })));
         if self.new.iter().map(|&new| self.quality(new)).fold(BEST, f32::min) <= BETTER * before.max(0.0) {
@@ -131,17 +146,19 @@ impl<Q: WedgeQuadric> Swapper<'_, Q> {
         }
         self.old.clear();
         self.old.extend([tet, other]);
-        self.replace()
-    }
-
-    /// Puts the new tets in the place of the old ones, if colours allow it.
-    fn replace(&mut self) -> bool {
-        if self.change_of_colors() > self.price {
+        if self.change_of_colors(own.into_iter().chain([apex])) > self.price {
             return false;
         }
-        let mesh = &mut *self.mesh;
+        self.replace();
+        true
+    }
+
+    /// Puts the new tets in the place of the old ones.
+    fn replace(&mut self) {
+        let Self { mesh, qualities, .. } = self;
         let label = mesh.labels[self.old[0] as usize];
         for &tet in &self.old {
+            qualities[tet as usize] = BEST;
             for v in std::mem::replace(&mut mesh.tets[tet as usize], [NONE; 4]) {
                 mesh.stars.remove(v, tet);
             }
@@ -151,30 +168,30 @@ impl<Q: WedgeQuadric> Swapper<'_, Q> {
             let tet = free.next().unwrap_or_else(|| {
                 mesh.tets.push([NONE; 4]);
                 mesh.labels.push(label);
+                qualities.push(BEST);
                 mesh.tets.len() as u32 - 1
             });
             mesh.tets[tet as usize] = corners;
+            qualities[tet as usize] = mesh.quality(corners.map(|v| mesh.places[v as usize]), self.limits);
             corners.iter().for_each(|&v| mesh.stars.add(v, tet));
         }
-        true
     }
 
-    /// At most what the squared colour changes by, integrated over the tets: within them colours are between those of the
-    /// corners, and on their surface they stay.
-    fn change_of_colors(&self) -> f32 {
+    /// At most what the squared colour changes by if the old tets are replaced by others of the same vertices, integrated
+    /// over them: within them colours are between those of the vertices, and on their surface they stay.
+    fn change_of_colors(&self, vertices: impl Iterator<Item = u32>) -> f32 {
         let mesh = &*self.mesh;
         let label = mesh.labels[self.old[0] as usize];
-        let mut vertices = self.new.as_flattened().to_vec();
-        vertices.sort_unstable();
-        vertices.dedup();
-        let wedges = vertices.iter().filter_map(|&v| mesh.wedge(v, label));
-        let colors: Vec<Vec3> = wedges.map(|wedge| wedge.quadric.color_at(Vec3::ZERO)).collect();
-        let mean = colors.iter().sum::<Vec3>() / colors.len().max(1) as f32;
+        let mut colors = [Vec3::ZERO; MOST_RING + 2];
+        let wedges = vertices.filter_map(|v| mesh.wedge(v, label));
+        let count = colors.iter_mut().zip(wedges).map(|(color, w)| *color = w.quadric.color_at(Vec3::ZERO)).count();
+        let colors = &colors[..count];
+        let mean = colors.iter().sum::<Vec3>() / count.max(1) as f32;
         let spread = colors.iter().map(|color| color.distance_squared(mean)).fold(0.0, f32::max);
-        let volume6 = |tet: &[u32; 4]| Form::of(tet.map(|v| mesh.places[v as usize])).volume6 as f32;
+        let volume6 = |&tet: &u32| Form::of(mesh.tets[tet as usize].map(|v| mesh.places[v as usize])).volume6 as f32;
         let unit = mesh.domain.unit() as f32;
         // The square of a hat over a simplex has a tenth of the simplex's volume.
-        spread * self.new.iter().map(volume6).sum::<f32>() / (60.0 * unit.powi(3))
+        spread * self.old.iter().map(volume6).sum::<f32>() / (60.0 * unit.powi(3))
     }
 }
 
