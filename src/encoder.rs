@@ -30,6 +30,10 @@ use crate::vectorize::segment::{SegmentParams, Segmenter};
 use crate::vectorize::simplify::{ColorQuadric, DistanceQuadric};
 use crate::video::Frame;
 
+/// Most sides of pixels between labels by content over vertices: beyond it, as in moire, labels take time and show nothing. At 49
+/// drawings still gain by theirs (docs/benchmarks.md).
+const BORDER_A_VERTEX: f32 = 64.0;
+
 /// Why the encoder refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum EncodeError {
@@ -109,7 +113,8 @@ impl Encoder {
     /// [`EncodeError::Setting`] for a value out of range, [`EncodeError::Threads`] where no threads can be started.
     pub fn try_new(config: EncoderConfig) -> Result<Self, EncodeError> {
         config.validate()?;
-        let params = SegmentParams::new(config.superpixels);
+        let most_border = BORDER_A_VERTEX * config.simplification_ratio as f32;
+        let params = SegmentParams { most_border, ..SegmentParams::new(config.superpixels) };
         Ok(Self {
             segmenter: Segmenter::new(config.width, config.height, params),
             slab: None,

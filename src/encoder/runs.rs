@@ -35,8 +35,6 @@ pub(super) struct Runs {
     adaptive: Option<AdaptiveLattice>,
     /// Frame steps of a run.
     steps: u32,
-    /// Whether labels may differ.
-    is_cut: bool,
     /// Planes that are not in a lattice yet, and before them the one that the next run starts with.
     waiting: Vec<Plane>,
     /// Number of the first plane waiting.
@@ -47,14 +45,12 @@ pub(super) struct Runs {
 
 impl Runs {
     pub(super) fn new(domain: Domain, config: &EncoderConfig) -> Self {
-        let is_cut = config.superpixels != 1;
         let is_small = domain.width.min(domain.height) < AdaptiveLattice::MIN_CUT;
-        let adaptive = config.lattice == LatticeKind::Adaptive && !(is_cut && is_small);
+        let adaptive = config.lattice == LatticeKind::Adaptive && !(config.superpixels != 1 && is_small);
         Self {
             domain,
             adaptive: adaptive.then(|| AdaptiveLattice::new(domain, config.lattice_ratio())),
             steps: config.run_steps(),
-            is_cut,
             waiting: Vec::new(),
             first: 0,
             held: None,
@@ -92,7 +88,7 @@ impl Runs {
             // What is left at the end must not be too short to be cut.
             return (steps >= self.steps + AdaptiveLattice::MIN_CUT).then_some(self.steps);
         }
-        if self.first == 0 && self.is_cut && steps < AdaptiveLattice::MIN_CUT {
+        if self.first == 0 && steps < AdaptiveLattice::MIN_CUT && is_cut(&self.waiting) {
             self.adaptive = None;
         }
         let runs = steps.div_ceil(AdaptiveLattice::MAX_STEPS);
@@ -108,7 +104,7 @@ impl Runs {
         self.first += steps;
         match &mut self.adaptive {
             Some(adaptive) => {
-                let (times, planes) = with_halves(planes, first, self.domain.unit(), self.is_cut);
+                let (times, planes) = with_halves(planes, first, self.domain.unit());
                 let planes_a_frame = if times.len() > 2 * steps as usize { 2 } else { 1 };
                 let (frames, labels): (Vec<Arc<Frame>>, Vec<LabelPlane>) = planes.into_iter().unzip();
                 let lattice = adaptive.push_planes(&times, &frames, &labels)?;
@@ -134,13 +130,20 @@ impl Runs {
     }
 }
 
+/// Whether labels differ anywhere.
+fn is_cut(planes: &[Plane]) -> bool {
+    let first = planes.first().map(|(_, labels)| labels.label(0, 0));
+    planes.iter().any(|(_, labels)| Some(labels.label(0, 0)) != first || !labels.is_uniform())
+}
+
 /// A run's planes and their times, with planes between frames where labels move by more than a pixel a frame: as many as
 /// the lattice's cells have room for, which it would otherwise fill with what it knows.
-fn with_halves(planes: Vec<Plane>, first: u32, unit: i32, is_cut: bool) -> (Vec<i64>, Vec<Plane>) {
+fn with_halves(planes: Vec<Plane>, first: u32, unit: i32) -> (Vec<i64>, Vec<Plane>) {
     const CELL: usize = AdaptiveLattice::MAX_STEPS as usize;
     let steps = planes.len() - 1;
     let room = if steps == CELL { steps } else { CELL.saturating_sub(steps) };
-    let is_worth_it = is_cut && room <= steps && planes.windows(2).any(|pair| is_moving(&pair[0].1, &pair[1].1));
+    let is_worth_it =
+        room <= steps && is_cut(&planes) && planes.windows(2).any(|pair| is_moving(&pair[0].1, &pair[1].1));
     let halves = if is_worth_it { room } else { 0 };
     let unit = i64::from(unit);
     let time = |n: usize| (i64::from(first) + n as i64) * unit;

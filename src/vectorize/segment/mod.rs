@@ -45,12 +45,15 @@ pub struct SegmentParams {
     /// Regions of fewer pixels are given to a neighbour, unless they jump by so much more than `jump_levels` that as much
     /// squared error goes with them.
     pub min_area_px: u32,
+    /// Chosen by content: most sides of pixels between labels over pixels of a frame. From a frame with more on the slab has
+    /// one label.
+    pub most_border: f32,
 }
 
 impl SegmentParams {
     /// Defaults for this number of superpixels.
     pub fn new(superpixels: u32) -> Self {
-        Self { superpixels, jump_levels: 60.0, min_area_px: 12 }
+        Self { superpixels, jump_levels: 60.0, min_area_px: 12, most_border: f32::INFINITY }
     }
 }
 

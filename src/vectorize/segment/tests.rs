@@ -437,3 +437,15 @@ fn a_scene_cut_starts_afresh() {
 fn frames_of_another_size_are_refused() {
     Segmenter::new(95, 72, SegmentParams::new(0)).push(&disc_frame([1.0, 1.0], 1.0));
 }
+
+#[test]
+fn too_much_border_is_texture_for_the_rest_of_the_slab() {
+    let stripes = |width: f32| draw(96, 48, |x, _| [if (x / width) as u32 % 2 == 0 { 20.0 } else { 220.0 }; 3]);
+    let mut segmenter = Segmenter::new(96, 48, SegmentParams { most_border: 0.1, ..SegmentParams::new(0) });
+    let mut is_uniform = |width: f32| segmenter.push(&stripes(width)).is_uniform();
+    assert!(!is_uniform(16.0));
+    assert!(is_uniform(6.0));
+    assert!(is_uniform(16.0));
+    segmenter.start_slab();
+    assert!(!segmenter.push(&stripes(16.0)).is_uniform());
+}

@@ -11,7 +11,7 @@ mod naming;
 mod unmix;
 mod zones;
 
-use merge::{MergeRules, Mixed, merge};
+use merge::{MergeRules, Mixed, Regions, merge};
 use naming::{Before, Palette};
 use unmix::Unmixing;
 use zones::find_zones;
@@ -58,12 +58,14 @@ pub(super) struct Content {
     before: Option<(Frame, Vec<Gray>, LabelPlane)>,
     palette: Palette,
     usual: Mixed,
+    /// Whether the slab had a frame with too much border.
+    is_texture: bool,
 }
 
 impl Content {
     /// For frames of this size, at the start of a slab.
     pub(super) fn new(raster: Raster, params: SegmentParams) -> Self {
-        Self { raster, params, before: None, palette: Palette::default(), usual: Mixed::default() }
+        Self { raster, params, before: None, palette: Palette::default(), usual: Mixed::default(), is_texture: false }
     }
 
     /// Forgets everything: the next frame starts afresh, from label 0.
@@ -71,6 +73,7 @@ impl Content {
         self.before = None;
         self.palette = Palette::default();
         self.usual = Mixed::default();
+        self.is_texture = false;
     }
 
     /// The labels of the next frame.
@@ -82,16 +85,7 @@ impl Content {
         }
         let zones = find_zones(self.raster, frame);
         let jump = (NOISE_JUMP * zones.roughness(self.raster, frame)).clamp(LEAST_JUMP, self.params.jump_levels);
-        let unmixing = Unmixing::new(self.raster, frame, zones);
-        let mut pixels = unmixing.pixels();
-        self.usual.learn(self.raster, &pixels, jump);
-        let rules = MergeRules { jump, min_area: self.params.min_area_px, worth: self.params.jump_levels };
-        let mut regions = merge(self.raster, &mut pixels, rules, self.usual);
-        // What comes to one region is no drawing.
-        if regions.areas.len() > 1 {
-            pixels = unmixing.with_inks().pixels();
-            regions = merge(self.raster, &mut pixels, rules, self.usual);
-        }
+        let (pixels, regions) = self.divide(Unmixing::new(self.raster, frame, zones), jump);
         let levels = pyramid(frame);
         let plane = match &self.before {
             // Whatever moved, there is nothing that a name would tell apart.
@@ -110,6 +104,32 @@ impl Content {
         };
         self.before = Some((frame.clone(), levels, plane.clone()));
         plane
+    }
+
+    /// The regions of a frame, boundaries being there from this jump on.
+    fn divide(&mut self, unmixing: Unmixing, jump: f32) -> (Vec<Pixel>, Regions) {
+        let rules = MergeRules { jump, min_area: self.params.min_area_px, worth: self.params.jump_levels };
+        let mut pixels = unmixing.pixels();
+        self.usual.learn(self.raster, &pixels, jump);
+        let mut regions = merge(self.raster, &mut pixels, rules, self.usual);
+        // What comes to one region is no drawing.
+        if regions.areas.len() > 1 {
+            pixels = unmixing.with_inks().pixels();
+            regions = merge(self.raster, &mut pixels, rules, self.usual);
+        }
+        self.is_texture |= self.border(&pixels) > self.params.most_border;
+        if self.is_texture {
+            // Fewer boundaries are worse than none: the strokes among them go first.
+            let rules = MergeRules { jump: f32::INFINITY, ..rules };
+            regions = merge(self.raster, &mut pixels, rules, self.usual);
+        }
+        (pixels, regions)
+    }
+
+    /// Sides of pixels between regions, over pixels.
+    fn border(&self, pixels: &[Pixel]) -> f32 {
+        let sides = self.raster.side_pairs().filter(|&(p, q)| pixels[p].region != pixels[q].region).count();
+        sides as f32 / self.raster.len() as f32
     }
 }
 
