@@ -440,7 +440,8 @@ fn frames_of_another_size_are_refused() {
 
 #[test]
 fn too_much_border_is_texture_for_the_rest_of_the_slab() {
-    let stripes = |width: f32| draw(96, 48, |x, _| [if (x / width) as u32 % 2 == 0 { 20.0 } else { 220.0 }; 3]);
+    let stripes =
+        |width: f32| draw(96, 48, |x, _| [if ((x / width) as u32).is_multiple_of(2) { 20.0 } else { 220.0 }; 3]);
     let mut segmenter = Segmenter::new(96, 48, SegmentParams { most_border: 0.1, ..SegmentParams::new(0) });
     let mut is_uniform = |width: f32| segmenter.push(&stripes(width)).is_uniform();
     assert!(!is_uniform(16.0));
@@ -448,4 +449,17 @@ fn too_much_border_is_texture_for_the_rest_of_the_slab() {
     assert!(is_uniform(16.0));
     segmenter.start_slab();
     assert!(!segmenter.push(&stripes(16.0)).is_uniform());
+}
+
+#[test]
+fn sharp_edges_of_what_is_not_flat_are_no_drawing() {
+    let blocks = |texture: f32| {
+        draw(96, 48, |x, y| {
+            let grain = texture * (((x as u32 * 7 + y as u32 * 13) % 5) as f32 - 2.0);
+            [if ((x / 24.0) as u32).is_multiple_of(2) { 40.0 } else { 200.0 } + grain; 3]
+        })
+    };
+    let labels = |texture: f32| Segmenter::new(96, 48, SegmentParams::new(0)).push(&blocks(texture));
+    assert!(!labels(0.0).is_uniform());
+    assert!(labels(1.0).is_uniform());
 }

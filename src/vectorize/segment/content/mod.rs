@@ -17,6 +17,7 @@ use unmix::Unmixing;
 use zones::find_zones;
 
 use super::SegmentParams;
+use super::flatness::Flatness;
 use super::motion::MotionField;
 use super::pyramid::{Gray, pyramid};
 use super::raster::Raster;
@@ -58,14 +59,27 @@ pub(super) struct Content {
     before: Option<(Frame, Vec<Gray>, LabelPlane)>,
     palette: Palette,
     usual: Mixed,
-    /// Whether the slab had a frame with too much border.
+    /// Whether the slab had a frame with too much border, or is not flat.
     is_texture: bool,
+    flatness: Flatness,
 }
+
+/// Least [`Flatness::factor`] of what has more than one label. Where a camera's pictures are sharp, or sharpened, their edges
+/// jump like those of drawings, but labels cost more than they give: what lies between edges takes the vertices.
+const LEAST_FLATNESS: f32 = 2.0;
 
 impl Content {
     /// For frames of this size, at the start of a slab.
     pub(super) fn new(raster: Raster, params: SegmentParams) -> Self {
-        Self { raster, params, before: None, palette: Palette::default(), usual: Mixed::default(), is_texture: false }
+        Self {
+            raster,
+            params,
+            before: None,
+            palette: Palette::default(),
+            usual: Mixed::default(),
+            is_texture: false,
+            flatness: Flatness::default(),
+        }
     }
 
     /// Forgets everything: the next frame starts afresh, from label 0.
@@ -74,6 +88,7 @@ impl Content {
         self.palette = Palette::default();
         self.usual = Mixed::default();
         self.is_texture = false;
+        self.flatness = Flatness::default();
     }
 
     /// The labels of the next frame.
@@ -85,7 +100,7 @@ impl Content {
         }
         let zones = find_zones(self.raster, frame);
         let jump = (NOISE_JUMP * zones.roughness(self.raster, frame)).clamp(LEAST_JUMP, self.params.jump_levels);
-        let (pixels, regions) = self.divide(Unmixing::new(self.raster, frame, zones), jump);
+        let (pixels, regions) = self.divide(frame, Unmixing::new(self.raster, frame, zones), jump);
         let levels = pyramid(frame);
         let plane = match &self.before {
             // Whatever moved, there is nothing that a name would tell apart.
@@ -107,7 +122,7 @@ impl Content {
     }
 
     /// The regions of a frame, boundaries being there from this jump on.
-    fn divide(&mut self, unmixing: Unmixing, jump: f32) -> (Vec<Pixel>, Regions) {
+    fn divide(&mut self, frame: &Frame, unmixing: Unmixing, jump: f32) -> (Vec<Pixel>, Regions) {
         let rules = MergeRules { jump, min_area: self.params.min_area_px, worth: self.params.jump_levels };
         let mut pixels = unmixing.pixels();
         self.usual.learn(self.raster, &pixels, jump);
@@ -117,13 +132,22 @@ impl Content {
             pixels = unmixing.with_inks().pixels();
             regions = merge(self.raster, &mut pixels, rules, self.usual);
         }
-        self.is_texture |= self.border(&pixels) > self.params.most_border;
+        if regions.areas.len() > 1 {
+            self.is_texture |= self.border(&pixels) > self.params.most_border || !self.is_flat(frame, &pixels);
+        }
         if self.is_texture {
             // Fewer boundaries are worse than none: the strokes among them go first.
             let rules = MergeRules { jump: f32::INFINITY, ..rules };
             regions = merge(self.raster, &mut pixels, rules, self.usual);
         }
         (pixels, regions)
+    }
+
+    /// Whether regions are flat, in the slab so far.
+    fn is_flat(&mut self, frame: &Frame, pixels: &[Pixel]) -> bool {
+        let regions = pixels.iter().map(|pixel| Label(pixel.region)).collect();
+        self.flatness.look(frame, &LabelPlane::new(frame.width(), frame.height(), regions));
+        self.flatness.factor() >= LEAST_FLATNESS
     }
 
     /// Sides of pixels between regions, over pixels.
