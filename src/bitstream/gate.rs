@@ -6,7 +6,7 @@
 //! at the focus come first. Meshes are long in time where nothing moves, so angles and distances are measured in the
 //! extents of the edges around.
 
-use glam::Vec3A;
+use glam::{Vec3A, Vec4};
 
 use super::extents;
 use super::front::{Corner, Front};
@@ -78,6 +78,15 @@ impl Gate {
     pub(super) fn distance2(&self, vertices: &Vertices, vertex: VertexId) -> f32 {
         let d = (3.0 * vertices.position(vertex) - self.sum) * self.scale;
         dot(d, d)
+    }
+
+    /// The same of four points side by side, axis by axis.
+    #[inline]
+    pub(super) fn distances2(&self, [x, y, t]: [Vec4; 3]) -> Vec4 {
+        let x = (3.0 * x - self.sum.x) * self.scale.x;
+        let y = (3.0 * y - self.sum.y) * self.scale.y;
+        let t = (3.0 * t - self.sum.z) * self.scale.z;
+        x * x + y * y + t * t
     }
 
     /// Class of that distance.

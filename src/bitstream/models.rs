@@ -2,6 +2,8 @@
 //!
 //! In: what was coded before in the same context. Out: probabilities. Forbidden here: bytes, and what is decided.
 
+use wide::i16x8;
+
 /// The probability that a decision is 1, learnt from the decisions coded before in the same context.
 ///
 /// The mean of the decisions so far, then an exponential average of the last ones.
@@ -109,11 +111,17 @@ impl SymbolModel {
 
     #[inline]
     pub(super) fn update(&mut self, symbol: usize) {
-        let rate = i32::from(SYMBOL_RATES[usize::from(self.seen)]);
-        for (i, below) in (0i16..).zip(&mut self.below) {
+        let rate = i16x8::splat(SYMBOL_RATES[usize::from(self.seen)]);
+        let symbol = i16x8::splat(symbol as i16);
+        let mut first = i16x8::new([0, 1, 2, 3, 4, 5, 6, 7]);
+        for eight in self.below.as_chunks_mut().0 {
+            let below = i16x8::new(*eight);
             // All but the symbol keep a part of 2^-15.
-            let end = if i > symbol as i16 { i16::MAX - (SYMBOLS as i16 - 1) + i } else { i };
-            *below += ((i32::from(end - *below) * rate + (1 << 15)) >> 16) as i16;
+            let end = first + (first.simd_gt(symbol) & i16x8::splat(i16::MAX - (SYMBOLS as i16 - 1)));
+            // The high half of the product, rounded by the highest bit of the low one.
+            let way = end - below;
+            *eight = (below + way.mul_keep_high(rate) - ((way * rate) >> 15i32)).to_array();
+            first += i16x8::splat(8);
         }
         self.seen = (self.seen + 1).min(SYMBOLS_SEEN_MAX as u16);
     }
@@ -135,6 +143,21 @@ mod tests {
                 assert!(found.eq(0..SYMBOLS));
                 assert_eq!(model.symbol_at(i16::MAX), SYMBOLS - 1);
             }
+        }
+    }
+
+    #[test]
+    fn symbols_are_learnt_as_the_format_says() {
+        let mut model = SymbolModel::new([8; SYMBOLS]);
+        let mut below = model.below.map(i32::from);
+        for i in 0..1_000u32 {
+            let symbol = i.wrapping_mul(0x9e37_79b9) >> 28;
+            model.update(symbol as usize);
+            for (s, below) in (0..).zip(&mut below).skip(1) {
+                let end = if s > symbol { 32_752 + s } else { s };
+                *below += ((end as i32 - *below) * (65_536 / (i.min(253) as i32 + 3)) + 32_768) >> 16;
+            }
+            assert_eq!(model.below.map(i32::from), below);
         }
     }
 

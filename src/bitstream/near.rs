@@ -2,19 +2,22 @@
 //!
 //! In: the front, a gate. Out: vertices, the most likely first. Forbidden here: coding.
 
+use glam::Vec4;
+
 use super::front::Front;
 use super::gate::{Gate, SCAN};
-use super::normals::{cross, dot};
+use super::normals::cross;
 use super::vertices::Vertices;
 use crate::mesh::VertexId;
 
 /// Finds the rings around gates. Kept from gate to gate for its memory.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rings {
-    near: Vec<Place>,
-    far: Vec<Place>,
     /// Neighbours of the gate's corners, whether near or not.
     ring: Vec<VertexId>,
+    /// Neighbours of these.
+    next_ring: Vec<VertexId>,
+    places: Vec<Place>,
 }
 
 /// A vertex by its distance from a gate: the bits of that, which order what is not negative just so, then the vertex.
@@ -29,24 +32,20 @@ impl Rings {
         gate: &Gate,
         asked: [VertexId; 3],
     ) -> Ranking<'_> {
-        self.near.clear();
-        find_around(&gate.corners, (front, vertices), gate, asked, &mut self.near);
-        Ranking { places: &self.near, others: &[], last: 0 }
+        collect_around(&gate.corners, (front, vertices), &mut self.ring);
+        find_before(&self.ring, vertices, gate, &mut self.places);
+        Ranking { places: &self.places, others: [gate.corners, asked], ring: &[], last: 0 }
     }
 
-    /// Far vertices: neighbours of the near ones that are not near.
+    /// Far vertices: neighbours of the gate's corners' neighbours, near or not, that are not near.
     pub(super) fn far(&mut self, front: &Front, vertices: &Vertices, gate: &Gate, asked: [VertexId; 3]) -> Ranking<'_> {
-        self.near(front, vertices, gate, asked);
-        self.near.sort_unstable();
-        self.ring.clear();
-        for vertex in gate.corners {
-            for_each_neighbour(front, vertices, vertex, |other| self.ring.push(other));
-        }
+        collect_around(&gate.corners, (front, vertices), &mut self.ring);
         self.ring.sort_unstable();
         self.ring.dedup();
-        self.far.clear();
-        find_around(&self.ring, (front, vertices), gate, asked, &mut self.far);
-        Ranking { places: &self.far, others: &self.near, last: 0 }
+        collect_around(&self.ring, (front, vertices), &mut self.next_ring);
+        find_before(&self.next_ring, vertices, gate, &mut self.places);
+        // Of the ring those that are before the gate are near, and no others are looked for.
+        Ranking { places: &self.places, others: [gate.corners, asked], ring: &self.ring, last: 0 }
     }
 }
 
@@ -54,45 +53,57 @@ fn vertex(place: Place) -> VertexId {
     VertexId(place as u32)
 }
 
-/// Takes note of the neighbours of some vertices that make a positive tet with the gate, as often as they are met.
-fn find_around(
-    around: &[VertexId],
-    (front, vertices): (&Front, &Vertices),
-    gate: &Gate,
-    asked: [VertexId; 3],
-    found: &mut Vec<Place>,
-) {
-    let [a, b, c] = gate.corners.map(|v| vertices.position(v));
-    let plane = cross(b - a, c - a);
-    let mut take_note = |vertex: VertexId| {
-        let is_positive = dot(plane, vertices.position(vertex) - a) > 0.0;
-        if is_positive & !asked.contains(&vertex) & !gate.corners.contains(&vertex) {
-            found.push(u64::from(gate.distance2(vertices, vertex).to_bits()) << 32 | u64::from(vertex.0));
-        }
-    };
+/// Other corners of the youngest open faces at some vertices, as often as they are met: the second one of each, and the
+/// third where there is no partner whose second it is.
+fn collect_around(around: &[VertexId], (front, vertices): (&Front, &Vertices), found: &mut Vec<VertexId>) {
+    found.clear();
     for &vertex in around {
-        for_each_neighbour(front, vertices, vertex, &mut take_note);
+        for corner in front.at(vertices, vertex).take(SCAN) {
+            found.push(front.vertex(corner.next()));
+            let third = corner.previous();
+            if !front.has_partner(third) {
+                found.push(front.vertex(third));
+            }
+        }
     }
 }
 
-/// Other corners of the youngest open faces at a vertex: the second one of each, and the third where there is no partner
-/// whose second it is.
-fn for_each_neighbour(front: &Front, vertices: &Vertices, vertex: VertexId, mut take_note: impl FnMut(VertexId)) {
-    for corner in front.at(vertices, vertex).take(SCAN) {
-        let [_, second, third] = front.vertices_from(corner);
-        take_note(second);
-        if !front.has_partner(corner.previous()) {
-            take_note(third);
+/// Those of some vertices that make a positive tet with the gate, by their distance from it: four at a time, and without
+/// branches, as which they are is as good as random.
+fn find_before(ring: &[VertexId], vertices: &Vertices, gate: &Gate, found: &mut Vec<Place>) {
+    let [a, b, c] = gate.corners.map(|v| vertices.position(v));
+    let plane = cross(b - a, c - a);
+    found.clear();
+    for four in ring.chunks(LANES) {
+        // After the last one the gate's first corner, which is not before it.
+        let ids: [VertexId; LANES] = std::array::from_fn(|lane| *four.get(lane).unwrap_or(&gate.corners[0]));
+        let [p, q, r, s] = ids.map(|v| vertices.position(v));
+        let [x, y, t] = [Vec4::new(p.x, q.x, r.x, s.x), Vec4::new(p.y, q.y, r.y, s.y), Vec4::new(p.z, q.z, r.z, s.z)];
+        let height = plane.x * (x - a.x) + plane.y * (y - a.y) + plane.z * (t - a.z);
+        let (height, distance2) = (height.to_array(), gate.distances2([x, y, t]).to_array());
+        let mut here = [0; LANES];
+        let mut count = 0;
+        for lane in 0..LANES {
+            here[count % LANES] = u64::from(distance2[lane].to_bits()) << 32 | u64::from(ids[lane].0);
+            count += usize::from(height[lane] > 0.0);
         }
+        let known = found.len();
+        found.extend(here);
+        found.truncate(known + count);
     }
 }
+
+/// Vertices that are measured at a time.
+const LANES: usize = 4;
 
 /// Vertices in the order of their distance from a gate, then of their ids; only those that could be its apex. They are not
 /// sorted: it is the first of them nearly always.
 pub(super) struct Ranking<'a> {
     places: &'a [Place],
-    /// Those left out, sorted.
-    others: &'a [Place],
+    /// Those left out.
+    others: [[VertexId; 3]; 2],
+    /// Those left out, too.
+    ring: &'a [VertexId],
     /// The last one found.
     last: Place,
 }
@@ -103,8 +114,9 @@ impl Iterator for Ranking<'_> {
     fn next(&mut self) -> Option<VertexId> {
         loop {
             self.last = self.places.iter().copied().filter(|&place| place > self.last).min()?;
-            if self.others.binary_search(&self.last).is_err() {
-                return Some(vertex(self.last));
+            let found = vertex(self.last);
+            if !self.others.as_flattened().contains(&found) && !self.ring.contains(&found) {
+                return Some(found);
             }
         }
     }

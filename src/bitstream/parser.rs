@@ -288,7 +288,7 @@ impl Side for Parsing<'_> {
         false
     }
 
-    fn behind(&mut self, _: u32, _: [VertexId; 3]) -> Apex {
+    fn behind(&mut self, _: u32, _: VertexId, _: [VertexId; 3]) -> Apex {
         Apex::New
     }
 

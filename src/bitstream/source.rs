@@ -17,7 +17,7 @@ use super::slab::Side;
 use super::{MeshFault, WriteError};
 use crate::mesh::{MeshError, TetMesh, VertexId, WedgeId};
 use crate::video::Label;
-use faces::Faces;
+use faces::{FaceOfTet, Faces, SourceTet};
 
 /// No tet, or no vertex.
 const NONE: u32 = u32::MAX;
@@ -28,8 +28,7 @@ const LAST_FRAME: usize = 1 << 19;
 /// What is known about the source mesh beyond itself, from packet to packet.
 #[derive(Debug)]
 pub(super) struct Source {
-    /// Tets across the face opposite each corner.
-    neighbours: Vec<[u32; 4]>,
+    tets: Vec<SourceTet>,
     faces: Faces,
     /// Per source tet: whether it is coded.
     is_coded: Vec<bool>,
@@ -37,8 +36,9 @@ pub(super) struct Source {
     left: usize,
     /// Source tets that were not coded when last looked at, by the frame in which their first vertex lies.
     pending: Vec<Vec<u32>>,
-    /// t of the source vertices for which that holds.
-    times: Vec<i32>,
+    /// Positions and pins of the source vertices when last looked at.
+    positions: Vec<IVec3>,
+    pinned: Vec<bool>,
     /// Stream id of each source vertex.
     coded_vertex: Vec<u32>,
     /// Source ids of the stream's vertices and tets.
@@ -54,12 +54,13 @@ pub(super) struct Source {
 impl Source {
     pub(super) fn new() -> Self {
         Self {
-            neighbours: Vec::new(),
+            tets: Vec::new(),
             faces: Faces::default(),
             is_coded: Vec::new(),
             left: 0,
             pending: Vec::new(),
-            times: Vec::new(),
+            positions: Vec::new(),
+            pinned: Vec::new(),
             coded_vertex: Vec::new(),
             source_vertex: Vec::new(),
             source_tet: Vec::new(),
@@ -69,69 +70,73 @@ impl Source {
         }
     }
 
-    /// Takes in the tets that `mesh` has gained.
+    /// Takes in the tets that `mesh` has gained, and what has become of its vertices.
     ///
     /// # Errors
-    /// A mesh that lost tets or vertices, or whose tets are not made of one label's wedges.
+    /// A mesh that lost tets or vertices, whose coded vertices have changed, or whose tets are not made of one label's
+    /// wedges.
     pub(super) fn update(&mut self, mesh: &TetMesh) -> Result<(), WriteError> {
-        let known = self.neighbours.len();
+        let known = self.tets.len();
         if mesh.tets.len() < known || mesh.positions.len() < self.coded_vertex.len() {
             return Err(WriteError::NotAppended { expected: known, found: mesh.tets.len() });
         }
         if mesh.pinned.len() != mesh.positions.len() {
             return Err(WriteError::Pinned { expected: mesh.positions.len(), found: mesh.pinned.len() });
         }
-        self.coded_vertex.resize(mesh.positions.len(), NONE);
-        self.follow_times(mesh);
+        self.follow_vertices(mesh)?;
         for tet in known..mesh.tets.len() {
             check_tet(mesh, tet)?;
             self.is_uniform &= mesh.tet_label(tet) == mesh.tet_label(0);
-            self.neighbours.push([NONE; 4]);
+            self.tets.push(SourceTet::new(mesh.tet_vertices(tet)));
             self.is_coded.push(false);
             self.left += 1;
             self.wait(mesh, tet as u32);
         }
-        let neighbours = &mut self.neighbours;
-        self.faces.pair(mesh, known, |one, other| {
-            neighbours[one.tet()][one.corner()] = other.tet() as u32;
-            neighbours[other.tet()][other.corner()] = one.tet() as u32;
-        });
+        self.faces.pair(&mut self.tets, known, mesh.positions.len());
         Ok(())
     }
 
-    /// Takes in what has become of the vertices' times. Those that are not coded may have moved.
-    fn follow_times(&mut self, mesh: &TetMesh) {
-        let has_moved = self.times.iter().zip(&mesh.positions).any(|(&t, position)| t != position.z);
-        self.times.clear();
-        self.times.extend(mesh.positions.iter().map(|position| position.z));
-        if has_moved {
-            for tet in std::mem::take(&mut self.pending).into_iter().flatten() {
-                self.wait(mesh, tet);
+    /// Takes in what has become of the vertices. Those that are not coded may have moved.
+    ///
+    /// # Errors
+    /// One that is coded and has changed.
+    fn follow_vertices(&mut self, mesh: &TetMesh) -> Result<(), WriteError> {
+        let known = self.coded_vertex.len();
+        let now = (&mesh.positions[..known], &mesh.pinned[..known]);
+        self.coded_vertex.resize(mesh.positions.len(), NONE);
+        // Mostly nothing has, which all at once is quickly seen.
+        if now != (&self.positions[..], &self.pinned[..]) {
+            let mut has_moved = false;
+            for vertex in 0..known {
+                let [old, new] = [(&self.positions, &self.pinned), (&mesh.positions, &mesh.pinned)]
+                    .map(|(positions, pinned)| (positions[vertex], pinned[vertex]));
+                if old != new && self.coded_vertex[vertex] != NONE {
+                    return Err(WriteError::Changed { vertex: vertex as u32 });
+                }
+                has_moved |= old.0.z != new.0.z;
+            }
+            self.positions.copy_from_slice(now.0);
+            self.pinned.copy_from_slice(now.1);
+            if has_moved {
+                for tet in std::mem::take(&mut self.pending).into_iter().flatten() {
+                    self.wait(mesh, tet);
+                }
             }
         }
+        self.positions.extend_from_slice(&mesh.positions[known..]);
+        self.pinned.extend_from_slice(&mesh.pinned[known..]);
+        Ok(())
     }
 
     /// Notes a tet that is to be coded.
     fn wait(&mut self, mesh: &TetMesh, tet: u32) {
-        let first = mesh.tet_positions(tet as usize).iter().map(|position| position.z).min().unwrap_or(0);
+        let times = self.tets[tet as usize].vertices.map(|v| mesh.positions[v.index()].z);
+        let first = times.into_iter().min().unwrap_or(0);
         let frame = usize::try_from(first >> mesh.domain.subpixel_bits).unwrap_or(0).min(LAST_FRAME);
         if self.pending.len() <= frame {
             self.pending.resize(frame + 1, Vec::new());
         }
         self.pending[frame].push(tet);
-    }
-
-    /// Checks that no vertex has changed since it was coded.
-    ///
-    /// # Errors
-    /// The first vertex that has.
-    pub(super) fn check_unchanged(&self, mesh: &TetMesh, coded: &TetMesh) -> Result<(), WriteError> {
-        for (now, sent) in self.source_vertex.iter().zip(coded.positions.iter().zip(&coded.pinned)) {
-            if (&mesh.positions[now.index()], &mesh.pinned[now.index()]) != sent {
-                return Err(WriteError::Changed { vertex: now.0 });
-            }
-        }
-        Ok(())
     }
 
     /// Whether every source tet is coded.
@@ -217,25 +222,24 @@ impl Side for Writing<'_> {
         false
     }
 
-    fn behind(&mut self, tet: u32, corners: [VertexId; 3]) -> Apex {
-        let corners = corners.map(|v| self.source.source_vertex[v.index()]);
-        let source_tet = self.source.source_tet[tet as usize] as usize;
-        let vertices = self.mesh.tet_vertices(source_tet);
-        let across = (0..4).find(|&corner| !corners.contains(&vertices[corner]));
-        let next = across.map_or(NONE, |corner| self.source.neighbours[source_tet][corner]);
-        if next == NONE || self.source.is_coded[next as usize] {
+    fn behind(&mut self, tet: u32, opposite: VertexId, corners: [VertexId; 3]) -> Apex {
+        let source = &mut *self.source;
+        let opposite = source.source_vertex[opposite.index()];
+        let before = &source.tets[source.source_tet[tet as usize] as usize];
+        let corner = before.vertices.iter().position(|&v| v == opposite);
+        let across = corner.map_or(FaceOfTet::NONE, |corner| before.across[corner]);
+        if across == FaceOfTet::NONE || source.is_coded[across.tet()] {
             let top = self.mesh.domain.extent().z;
-            let at_top = corners.iter().all(|v| self.mesh.positions[v.index()].z == top);
-            return if at_top { Apex::Top } else { Apex::Hole };
+            let is_at_top = |v: VertexId| self.mesh.positions[source.source_vertex[v.index()].index()].z == top;
+            return if corners.into_iter().all(is_at_top) { Apex::Top } else { Apex::Hole };
         }
-        self.tet = next as usize;
-        let apex = self.mesh.tet_vertices(self.tet).into_iter().find(|v| !corners.contains(v));
-        self.vertex = apex.unwrap_or(corners[0]);
+        self.tet = across.tet();
+        self.vertex = source.tets[self.tet].vertices[across.corner()];
         self.coded(self.vertex).map_or(Apex::New, Apex::Known)
     }
 
     fn seed_corner(&mut self, corner: usize) -> Option<VertexId> {
-        self.vertex = self.mesh.tet_vertices(self.tet)[corner];
+        self.vertex = self.source.tets[self.tet].vertices[corner];
         self.coded(self.vertex)
     }
 
@@ -262,8 +266,8 @@ impl Side for Writing<'_> {
 
     fn wedge_made(&mut self, vertex: VertexId) {
         let vertex = self.source.source_vertex[vertex.index()];
-        let wedges = self.mesh.tets[self.tet];
-        let wedge = wedges.into_iter().find(|&w| self.mesh.vertex(w) == vertex).unwrap_or(wedges[0]);
+        let corner = self.source.tets[self.tet].vertices.iter().position(|&v| v == vertex);
+        let wedge = self.mesh.tets[self.tet][corner.unwrap_or(0)];
         self.source.source_wedge.push(wedge);
     }
 

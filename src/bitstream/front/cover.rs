@@ -216,7 +216,9 @@ fn pass_side(
     let extent = extents::around([tet.extents[from], tet.extents[to], tet.extents[3]]);
     let normal = unit_normal(cross(tet.edges[from], tet.edges[to]), extent);
     let before = Before { tet: tet.number, label: tet.label, opposite: tet.corners[face] };
-    let corners = [from, to, 3].map(|corner| (tet.corners[corner], tet.ends[corner]));
+    // Not mapped: such small functions are not always inlined.
+    let at_apex = (tet.corners[3], tet.ends[3]);
+    let corners = [(tet.corners[from], tet.ends[from]), (tet.corners[to], tet.ends[to]), at_apex];
     let opened = open(rows, normals, free, corners, normal, before);
     Ok([opened, Corner(opened.0 + 1), Corner(opened.0 + 2)])
 }

@@ -1,25 +1,31 @@
 //! Which tets of the source mesh share faces.
 //!
-//! In: a mesh that only grows. Out: pairs of faces with the same vertices. Forbidden here: what the pairs are for.
+//! In: tets, more and more of them. Out: the tets across their faces. Forbidden here: what that is for.
 //!
-//! Faces are sorted by their lowest vertex, many tets at a time; among those of one vertex, some twenty, mirror images lie
-//! next to each other once they are in order. So no face is looked for, and nothing is asked that is as good as random.
+//! Faces are sorted by their lowest vertex, many tets at a time; among those of one vertex, some twenty, mirror images are
+//! found by looking. So no face is looked for anywhere else, and nothing is asked that is as good as random.
 
-use crate::mesh::{FACES, TetMesh};
+use crate::mesh::{FACES, VertexId};
 
-/// Tets whose faces are sorted at once: bounds what that takes.
-const BATCH: usize = 1 << 16;
+/// Tets whose faces are sorted at once: what that takes should stay in the caches.
+const BATCH: usize = 1 << 15;
+
+/// Faces of one vertex that are compared one with another; more are sorted.
+const FEW: usize = 64;
 
 /// No entry.
 const NONE: u32 = u32::MAX;
 
-/// A face of a tet: the one opposite a corner.
+/// A face of a tet: the one opposite a corner. The number of the tet, and below it that of the corner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct FaceOfTet(u64);
+pub(super) struct FaceOfTet(u32);
 
 impl FaceOfTet {
+    /// No face.
+    pub(super) const NONE: Self = Self(NONE);
+
     fn new(tet: usize, corner: usize) -> Self {
-        Self((tet as u64) << 2 | corner as u64)
+        Self((tet as u32) << 2 | corner as u32)
     }
 
     pub(super) fn tet(self) -> usize {
@@ -28,6 +34,30 @@ impl FaceOfTet {
 
     pub(super) fn corner(self) -> usize {
         (self.0 & 3) as usize
+    }
+}
+
+/// A tet among others: half a line of the cache.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(32))]
+pub(super) struct SourceTet {
+    pub(super) vertices: [VertexId; 4],
+    /// The face of another tet that is the mirror image of that opposite each corner.
+    pub(super) across: [FaceOfTet; 4],
+}
+
+impl SourceTet {
+    /// A tet by itself.
+    pub(super) fn new(vertices: [VertexId; 4]) -> Self {
+        Self { vertices, across: [FaceOfTet::NONE; 4] }
+    }
+
+    /// The face opposite a corner: its lowest vertex, and the others, the lower one above.
+    fn face(&self, corner: usize) -> (usize, u64) {
+        let [a, b, c] = FACES[corner].map(|corner| self.vertices[corner].0);
+        let (low, high) = (a.min(b), a.max(b));
+        let (lowest, middle, highest) = (low.min(c), low.max(c.min(high)), high.max(c));
+        (lowest as usize, u64::from(middle) << 32 | u64::from(highest))
     }
 }
 
@@ -48,29 +78,55 @@ pub(super) struct Faces {
     entries: Vec<(Listed, u32)>,
     /// Entries that are not in use.
     free: Vec<u32>,
+    /// Where the faces of each vertex end, and these: kept for their memory.
+    ends: Vec<u32>,
+    sorted: Vec<Listed>,
 }
 
 impl Faces {
-    /// Finds the pairs among the faces of the tets from `first` on and those met once before.
-    pub(super) fn pair(&mut self, mesh: &TetMesh, first: usize, mut found: impl FnMut(FaceOfTet, FaceOfTet)) {
-        self.last.resize(mesh.positions.len(), NONE);
-        for start in (first..mesh.tets.len()).step_by(BATCH) {
-            let (mut ends, mut sorted) = sort(mesh, start..mesh.tets.len().min(start + BATCH));
-            ends.insert(0, 0);
-            for (vertex, range) in ends.windows(2).enumerate() {
-                let faces = &mut sorted[range[0] as usize..range[1] as usize];
-                faces.sort_unstable();
-                let mut left = &*faces;
-                while let [one, rest @ ..] = left {
-                    left = rest;
-                    if let Some(other) = left.first().filter(|other| other.others == one.others) {
-                        left = &left[1..];
-                        found(one.face, other.face);
-                    } else if let Some(other) = self.meet(vertex, *one) {
-                        found(one.face, other);
-                    }
+    /// Finds what lies across the faces of the tets from `first` on, whose vertices are below `vertices`, among them and
+    /// the faces met once before.
+    pub(super) fn pair(&mut self, tets: &mut [SourceTet], first: usize, vertices: usize) {
+        self.last.resize(vertices, NONE);
+        for start in (first..tets.len()).step_by(BATCH) {
+            let (ends, sorted) = (std::mem::take(&mut self.ends), std::mem::take(&mut self.sorted));
+            let (ends, mut sorted) = sort(tets, start..tets.len().min(start + BATCH), vertices, (ends, sorted));
+            let mut begin = 0;
+            for (vertex, &end) in ends.iter().enumerate() {
+                let faces = &mut sorted[begin..end as usize];
+                begin = end as usize;
+                if faces.len() > FEW {
+                    faces.sort_unstable();
                 }
+                self.pair_at(tets, vertex, faces);
             }
+            (self.ends, self.sorted) = (ends, sorted);
+        }
+    }
+
+    /// The same for faces with one lowest vertex. Of many those that are mirror images lie side by side.
+    fn pair_at(&mut self, tets: &mut [SourceTet], lowest: usize, faces: &mut [Listed]) {
+        let most = if faces.len() > FEW { 1 } else { FEW };
+        let mut left = faces;
+        while let [one, rest @ ..] = left {
+            let other = rest.iter().take(most).position(|other| other.others == one.others);
+            let pair = match other {
+                Some(place) => {
+                    // The first of the rest is looked at next, so it takes the place of the one that was found.
+                    let other = rest[place];
+                    rest[place] = rest[0];
+                    left = &mut rest[1..];
+                    Some(other.face)
+                }
+                None => {
+                    let found = self.meet(lowest, *one);
+                    let (face, pair) = (one.face, found);
+                    left = rest;
+                    link(tets, face, pair);
+                    continue;
+                }
+            };
+            link(tets, one.face, pair);
         }
     }
 
@@ -103,31 +159,39 @@ impl Faces {
     }
 }
 
-/// The faces of some tets by their lowest vertices, and where those of each vertex end.
-fn sort(mesh: &TetMesh, tets: std::ops::Range<usize>) -> (Vec<u32>, Vec<Listed>) {
-    let faces: Vec<(u32, Listed)> = tets
-        .flat_map(|tet| {
-            let vertices = mesh.tet_vertices(tet);
-            [0, 1, 2, 3].map(|corner| {
-                let [a, b, c] = FACES[corner].map(|corner| vertices[corner].0);
-                let (low, high) = (a.min(b), a.max(b));
-                let (lowest, middle, highest) = (low.min(c), low.max(c.min(high)), high.max(c));
-                let others = u64::from(middle) << 32 | u64::from(highest);
-                (lowest, Listed { others, face: FaceOfTet::new(tet, corner) })
-            })
-        })
-        .collect();
-    let mut ends = vec![0; mesh.positions.len()];
-    faces.iter().for_each(|(lowest, _)| ends[*lowest as usize] += 1);
+/// Notes that two faces are mirror images.
+fn link(tets: &mut [SourceTet], one: FaceOfTet, other: Option<FaceOfTet>) {
+    if let Some(other) = other {
+        tets[one.tet()].across[one.corner()] = other;
+        tets[other.tet()].across[other.corner()] = one;
+    }
+}
+
+/// The faces of some tets by their lowest vertices, and where those of each vertex end, in the memory of others.
+fn sort(
+    tets: &[SourceTet],
+    range: std::ops::Range<usize>,
+    vertices: usize,
+    (mut ends, mut sorted): (Vec<u32>, Vec<Listed>),
+) -> (Vec<u32>, Vec<Listed>) {
+    ends.clear();
+    ends.resize(vertices, 0);
+    for tet in &tets[range.clone()] {
+        (0..4).for_each(|corner| ends[tet.face(corner).0] += 1);
+    }
     let mut start = 0;
     for end in &mut ends {
         start += std::mem::replace(end, start);
     }
-    let mut sorted = vec![Listed { others: 0, face: FaceOfTet(0) }; faces.len()];
-    for (lowest, listed) in faces {
-        let end = &mut ends[lowest as usize];
-        sorted[*end as usize] = listed;
-        *end += 1;
+    sorted.clear();
+    sorted.resize(start as usize, Listed { others: 0, face: FaceOfTet::NONE });
+    for tet in range {
+        for corner in 0..4 {
+            let (lowest, others) = tets[tet].face(corner);
+            let end = &mut ends[lowest];
+            sorted[*end as usize] = Listed { others, face: FaceOfTet::new(tet, corner) };
+            *end += 1;
+        }
     }
     (ends, sorted)
 }
@@ -136,46 +200,55 @@ fn sort(mesh: &TetMesh, tets: std::ops::Range<usize>) -> (Vec<u32>, Vec<Listed>)
 mod tests {
     use std::collections::BTreeMap;
 
-    use glam::{IVec3, Vec3};
-
     use super::*;
-    use crate::mesh::{Domain, VertexId, Wedge, WedgeId};
-    use crate::video::Label;
 
     #[test]
     fn pairs_are_found_whenever_they_come() {
-        let mut mesh = TetMesh::empty(Domain { width: 1, height: 1, duration: 1, subpixel_bits: 0 });
-        for vertex in 0..12 {
-            mesh.push_vertex(IVec3::ZERO);
-            mesh.push_wedge(Wedge { vertex: VertexId(vertex), label: Label(0), color: Vec3::ZERO });
-        }
+        let mut tets: Vec<SourceTet> = Vec::new();
         let mut faces = Faces::default();
-        let mut expected: BTreeMap<[u32; 3], FaceOfTet> = BTreeMap::new();
+        let mut met: BTreeMap<[u32; 3], FaceOfTet> = BTreeMap::new();
+        let mut across: Vec<[FaceOfTet; 4]> = Vec::new();
         for first in 0..9u32 {
             let corners = [first, first + 1, (first + 2) % 12, first + 3];
-            mesh.tets.push(corners.map(WedgeId));
+            tets.push(SourceTet::new(corners.map(VertexId)));
+            across.push([FaceOfTet::NONE; 4]);
             if first % 3 == 1 {
                 continue;
             }
-            let mut found = Vec::new();
-            let known = mesh.tets.len() - if first % 3 == 2 { 2 } else { 1 };
-            faces.pair(&mesh, known, |one, other| found.push((one.max(other), one.min(other))));
-            let mut wanted = Vec::new();
-            for tet in known..mesh.tets.len() {
+            let known = tets.len() - if first % 3 == 2 { 2 } else { 1 };
+            faces.pair(&mut tets, known, 12);
+            for tet in known..tets.len() {
                 for (corner, face) in FACES.into_iter().enumerate() {
-                    let mut key = face.map(|corner| mesh.tet_vertices(tet)[corner].0);
+                    let mut key = face.map(|corner| tets[tet].vertices[corner].0);
                     key.sort_unstable();
                     let here = FaceOfTet::new(tet, corner);
-                    match expected.remove(&key) {
-                        Some(other) => wanted.push((here, other)),
-                        None => drop(expected.insert(key, here)),
+                    match met.remove(&key) {
+                        Some(other) => {
+                            across[tet][corner] = other;
+                            across[other.tet()][other.corner()] = here;
+                        }
+                        None => drop(met.insert(key, here)),
                     }
                 }
             }
-            found.sort_unstable();
-            wanted.sort_unstable();
-            assert_eq!(found, wanted);
+            assert!(tets.iter().map(|tet| tet.across).eq(across.iter().copied()));
         }
-        assert_eq!(expected.len(), 4 * 9 - 2 * 8);
+        assert_eq!(met.len(), 4 * 9 - 2 * 8);
+    }
+
+    /// A vertex with more faces than are compared one with another.
+    #[test]
+    fn pairs_at_a_hub_are_found() {
+        let count = 100u32;
+        let fan = |i: u32| SourceTet::new([0, 1, 2 + i, 2 + (i + 1) % count].map(VertexId));
+        let mut tets: Vec<SourceTet> = (0..count).map(fan).collect();
+        Faces::default().pair(&mut tets, 0, count as usize + 2);
+        for (i, tet) in tets.iter().enumerate() {
+            let [at_hub, other, before, after] = tet.across;
+            assert_eq!([at_hub, other], [FaceOfTet::NONE; 2]);
+            let next = (i + 1) % count as usize;
+            assert_eq!([before.tet(), tets[next].across[3].tet()], [next, i]);
+            assert_eq!(after.tet(), (i + count as usize - 1) % count as usize);
+        }
     }
 }
