@@ -101,13 +101,14 @@ impl ColorSpace {
 pub(super) struct Rows<'a> {
     pub(super) pixels: &'a mut [Pixel],
     /// Pixels from a row to the next.
-    pub(super) stride: usize,
+    pub(super) stride: u32,
 }
 
 impl Rows<'_> {
     /// The bytes of so many parts of a chunk from the pixel `start` on.
     #[inline(always)]
-    pub(super) fn chunk_mut<const WIDTH: usize>(&mut self, start: usize) -> Option<&mut [[u8; 4 * PART]; WIDTH]> {
+    pub(super) fn chunk_mut<const WIDTH: usize>(&mut self, start: u32) -> Option<&mut [[u8; 4 * PART]; WIDTH]> {
+        let start = start as usize;
         let pixels = self.pixels.get_mut(start..start + WIDTH * PART)?;
         pixels.as_flattened_mut().as_chunks_mut().0.first_chunk_mut()
     }
@@ -150,7 +151,7 @@ impl Canvas {
     /// All rows.
     #[inline]
     pub(super) fn rows_mut(&mut self) -> Rows<'_> {
-        Rows { pixels: &mut self.pixels, stride: self.width + CHUNK }
+        Rows { pixels: &mut self.pixels, stride: (self.width + CHUNK) as u32 }
     }
 
     /// The pixels of a row.

@@ -7,6 +7,7 @@
 use super::canvas::PART;
 use super::cpu::{self, Kernel};
 use super::lanes::{LANES, Lanes, ceil, least, most, whole};
+use super::near::Sides;
 use super::run::{FRACTION, Run, Way};
 use super::scan::{Edge, ROWS, Span, Turning, span};
 use super::slice::Polygons;
@@ -101,6 +102,16 @@ impl Measures {
         let of = |channels: &[Lanes<i32>; 3]| [channels[0][lane], channels[1][lane], channels[2][lane]];
         let origin = [self.column[lane] as u16, self.row[lane] as u16];
         Run { base: of(&self.base), right: of(&self.right), down: of(&self.down), origin, way }
+    }
+
+    /// Its edges from the upper corner on, as seen from the first pixel.
+    #[inline]
+    pub(super) fn sides(&self, lane: usize) -> Sides {
+        let edges = edges_of(&self.edges, lane);
+        let (left, right) =
+            (usize::from(edges[1].first < edges[0].first), 2 + usize::from(edges[3].first < edges[2].first));
+        let top = if edges[right].first < edges[left].first { right } else { left };
+        Sides::new([0, 1, 2, 3].map(|i| edges[(top + i) % 4]), [self.column[lane], self.row[lane]])
     }
 
     /// What it covers of its first rows.

@@ -1,7 +1,7 @@
 //! From a slab's control mesh to pixels: subdivide, slice at a time, fill, pack into the pixel format.
 //!
 //! ```text
-//! complex -> rings -> level | refiner -> slice -> setup -> scan, run -> canvas -> crossed -> pack
+//! complex -> rings -> level | refiner -> slice -> setup -> near | scan, run -> canvas -> crossed -> pack
 //! ```
 //!
 //! In: a mesh, a time, a size. Out: pixels; for the fit also masks ([`color_masks`], [`position_masks`]) and where
@@ -23,6 +23,7 @@ mod lanes;
 mod level;
 mod masks;
 mod measure;
+mod near;
 mod pack;
 mod paint;
 mod parallel;

@@ -9,11 +9,12 @@ use std::sync::{Mutex, PoisonError};
 use super::canvas::{Canvas, ColorSpace, PARTS};
 use super::cpu::{self, Kernel};
 use super::crossed::Crossed;
+use super::near::{ROWS as TALL_ROWS, Sides};
 use super::pack::{BAND_ROWS, Band, bands};
 use super::parallel::for_each;
 use super::piece::{Piece, Pieces, Shape};
 use super::run::Brush;
-use super::scan::{Edge, Outline, spans};
+use super::scan::{Edge, Outline, Span, spans};
 use super::scene::CHUNK;
 use super::view::View;
 use crate::video::Surface;
@@ -110,32 +111,32 @@ impl Kernel for Painting<'_, '_> {
     fn run(mut self) {
         self.canvas.start(self.space, self.picture.view.columns as usize, self.rows.len());
         let mut pieces = [Piece::NOTHING; BATCH];
-        let mut outlines = [Outline::NOTHING; BATCH];
+        let mut sides = [Sides::NOTHING; BATCH];
         for names in self.names.chunks(BATCH) {
             // Pieces lie far apart: fetched in one go, the waits for them overlap.
             for (piece, (list, place)) in pieces.iter_mut().zip(self.picture.named(names)) {
                 *piece = list.pieces[place];
             }
-            for ((outline, piece), (list, _)) in outlines.iter_mut().zip(&pieces).zip(self.picture.named(names)) {
+            for ((sides, piece), (list, _)) in sides.iter_mut().zip(&pieces).zip(self.picture.named(names)) {
                 if let Some(number) = piece.edges() {
-                    *outline = list.tall[number];
+                    *sides = list.tall[number];
                 }
             }
-            for (piece, outline) in pieces[..names.len()].iter().zip(&outlines) {
-                self.paint(piece, outline);
+            for ((piece, sides), (list, _)) in pieces.iter().zip(&sides).zip(self.picture.named(names)) {
+                self.paint(piece, sides, &list.outlines);
             }
         }
     }
 }
 
 impl Painting<'_, '_> {
-    /// Paints what of a piece lies in the rows. `outline` counts where it is tall.
+    /// Paints what of a piece lies in the rows. `sides` count where it is tall; among `outlines` is its own then.
     #[inline(always)]
-    fn paint(&mut self, piece: &Piece, outline: &Outline) {
+    fn paint(&mut self, piece: &Piece, sides: &Sides, outlines: &[Outline]) {
         match piece.shape() {
             Shape::Small => self.paint_low(piece, &piece.run.brush::<1>(self.space)),
             Shape::Low => self.paint_low(piece, &piece.run.brush::<PARTS>(self.space)),
-            Shape::Tall => self.paint_tall(piece, outline),
+            Shape::Tall | Shape::Vast => self.paint_tall(piece, sides, outlines),
         }
     }
 
@@ -145,19 +146,22 @@ impl Painting<'_, '_> {
         // The table of bands names pieces in bands that they have rows in.
         let cover = (seen.start - own.start) as usize..(seen.end - own.start) as usize;
         let mut rows = self.canvas.rows_mut();
-        let at = (seen.start - self.rows.start) as usize * rows.stride;
+        let at = (seen.start - self.rows.start) as u32 * rows.stride;
         brush.paint(&mut rows, at, seen.start, piece.cover.get(cover).unwrap_or_default());
     }
 
     #[inline(always)]
-    fn paint_tall(&mut self, piece: &Piece, outline: &Outline) {
-        let (edges, (_, seen)) = (Edge::all(outline), self.rows_of(piece));
+    fn paint_tall(&mut self, piece: &Piece, sides: &Sides, outlines: &[Outline]) {
+        let (_, seen) = self.rows_of(piece);
         let brush = piece.run.brush::<PARTS>(self.space);
         let mut rows = self.canvas.rows_mut();
+        let columns = self.picture.view.columns;
         for row in seen.clone().step_by(TALL_ROWS) {
-            let found = spans::<TALL_ROWS>(&edges, row, self.picture.view.columns);
+            let is_near = piece.shape() == Shape::Tall;
+            let found = if is_near { sides.spans(piece.run.origin, row, columns) } else { None };
+            let found = found.unwrap_or_else(|| exactly(piece, outlines, row, columns));
             let count = TALL_ROWS.min((seen.end - row) as usize);
-            let at = (row - self.rows.start) as usize * rows.stride;
+            let at = (row - self.rows.start) as u32 * rows.stride;
             brush.paint(&mut rows, at, row, &found[..count]);
         }
     }
@@ -171,8 +175,29 @@ impl Painting<'_, '_> {
     }
 }
 
-/// Rows of a tall piece that are looked up together.
-const TALL_ROWS: usize = 8;
+/// Spans of a tall piece where single precision is not sure of them.
+#[cold]
+#[inline(never)]
+fn exactly(piece: &Piece, outlines: &[Outline], row: i32, columns: i32) -> [Span; TALL_ROWS] {
+    let outline = piece.edges().and_then(|number| outlines.get(number));
+    cpu::run(Exactly { outline: outline.unwrap_or(&Outline::NOTHING), row, columns })
+}
+
+/// See [`exactly`].
+struct Exactly<'a> {
+    outline: &'a Outline,
+    row: i32,
+    columns: i32,
+}
+
+impl Kernel for Exactly<'_> {
+    type Output = [Span; TALL_ROWS];
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        spans(&Edge::all(self.outline), self.row, self.columns)
+    }
+}
 
 /// Low bits of a polygon's name: its place in its list; the others number the list.
 const NAME_BITS: u32 = 14;

@@ -5,6 +5,7 @@ use std::ops::Range;
 use glam::Vec4;
 
 use super::grid::turn;
+use super::near::Sides;
 use super::parallel::List;
 use super::run::Run;
 use super::scan::{Outline, ROWS, Span};
@@ -48,6 +49,8 @@ pub(super) enum Shape {
     Low,
     /// More rows: its edges are kept apart.
     Tall,
+    /// The same, but too large for [`near`](super::near).
+    Vast,
 }
 
 /// A convex polygon that turns from +x to +y, ready to be painted; a line of the cache.
@@ -76,8 +79,9 @@ impl Piece {
 
     /// Of many rows, given the number of its edges.
     #[inline]
-    pub(super) fn tall(run: Run, end_row: u16, edges: usize) -> Self {
-        Self { run, end_row, shape: Shape::Tall, cover: [Span::number(edges as u32); ROWS] }
+    pub(super) fn tall(run: Run, end_row: u16, is_near: bool, edges: usize) -> Self {
+        let shape = if is_near { Shape::Tall } else { Shape::Vast };
+        Self { run, end_row, shape, cover: [Span::number(edges as u32); ROWS] }
     }
 
     /// Rows of the surface in which it counts.
@@ -95,7 +99,7 @@ impl Piece {
     /// Which of [`Pieces::tall`] are its edges, if it is tall.
     #[inline]
     pub(super) fn edges(&self) -> Option<usize> {
-        (self.shape == Shape::Tall).then_some(self.cover[0].to_number() as usize)
+        matches!(self.shape, Shape::Tall | Shape::Vast).then_some(self.cover[0].to_number() as usize)
     }
 }
 
@@ -107,8 +111,10 @@ pub(super) struct Pieces {
     pub(super) rows: Vec<[u16; 2]>,
     /// For anti-aliasing, one a piece.
     pub(super) patches: Vec<Patch>,
-    /// Outlines of those that are tall.
-    pub(super) tall: Vec<Outline>,
+    /// Edges of those that are tall.
+    pub(super) tall: Vec<Sides>,
+    /// Outlines of the same.
+    pub(super) outlines: Vec<Outline>,
 }
 
 impl List for Pieces {
@@ -117,5 +123,6 @@ impl List for Pieces {
         self.rows.clear();
         self.patches.clear();
         self.tall.clear();
+        self.outlines.clear();
     }
 }

@@ -93,22 +93,20 @@ impl<const WIDTH: usize> Brush<'_, WIDTH> {
     /// Paints spans of the rows from `row` on; `at` is where the first of them begins. Colours are clamped to [0, 255]
     /// pixel by pixel and rounded to the nearest level.
     #[inline(always)]
-    pub(super) fn paint(&self, rows: &mut Rows<'_>, mut at: usize, row: i32, spans: &[Span]) {
+    pub(super) fn paint(&self, rows: &mut Rows<'_>, mut at: u32, row: i32, spans: &[Span]) {
         let Run { base, down, origin, way, .. } = self.run;
+        if *way != Way::Chunks {
+            return self.paint_pixels(rows, at, row, spans);
+        }
         let down = four(*down);
-        // In the column of the origin.
-        let mut value = four(*base) + down * i32x4::splat(row - i32::from(origin[1])) + HALF;
+        // In the first column, wherever that is: sums may overflow.
+        let mut value = four(*base) + down * i32x4::splat(row - i32::from(origin[1])) + HALF
+            - self.right * i32x4::splat(origin[0].into());
         for span in spans {
-            let columns = span.columns();
-            if !columns.is_empty() {
-                let first = value + self.right * i32x4::splat(columns.start as i32 - i32::from(origin[0]));
-                let (start, count) = (at + columns.start, columns.len());
-                if *way == Way::Chunks {
-                    self.paint_chunks(rows, start, count, first);
-                } else {
-                    let [second, first, third, _] = (first - HALF).to_array();
-                    self.paint_pixels(rows, start, count, [second, first, third]);
-                }
+            let (start, end) = span.ends();
+            if start < end {
+                let first = value + self.right * i32x4::splat(start as i32);
+                self.paint_chunks(rows, at + start, end - start, first);
             }
             value += down;
             at += rows.stride;
@@ -116,16 +114,17 @@ impl<const WIDTH: usize> Brush<'_, WIDTH> {
     }
 
     #[inline(always)]
-    fn paint_chunks(&self, rows: &mut Rows<'_>, mut start: usize, mut left: usize, mut value: i32x4) {
-        while left > WIDTH * PART {
+    fn paint_chunks(&self, rows: &mut Rows<'_>, mut start: u32, mut left: u32, mut value: i32x4) {
+        let width = (WIDTH * PART) as u32;
+        while left > width {
             let Some(chunk) = rows.chunk_mut::<WIDTH>(start) else { return };
             chunk.iter_mut().zip(self.painted(value)).for_each(|(bytes, painted)| *bytes = painted);
-            value += self.right * i32x4::splat((WIDTH * PART) as i32);
-            start += WIDTH * PART;
-            left -= WIDTH * PART;
+            value += self.right * i32x4::splat(width as i32);
+            start += width;
+            left -= width;
         }
         let Some(chunk) = rows.chunk_mut::<WIDTH>(start) else { return };
-        for ((bytes, painted), mask) in chunk.iter_mut().zip(self.painted(value)).zip(MASKS[left & MOST]) {
+        for ((bytes, painted), mask) in chunk.iter_mut().zip(self.painted(value)).zip(MASKS[left as usize & MOST]) {
             for ((byte, painted), mask) in bytes.iter_mut().zip(painted).zip(mask) {
                 *byte = painted & mask | *byte & !mask;
             }
@@ -149,9 +148,20 @@ impl<const WIDTH: usize> Brush<'_, WIDTH> {
     }
 
     #[inline(never)]
-    fn paint_pixels(&self, rows: &mut Rows<'_>, start: usize, count: usize, values: [i32; 3]) {
-        let Some(pixels) = rows.pixels.get_mut(start..start + count) else { return };
-        cpu::run(Pixelwise { run: self.run, space: self.space, pixels, values });
+    fn paint_pixels(&self, rows: &mut Rows<'_>, mut at: u32, row: i32, spans: &[Span]) {
+        let Run { base, right, down, origin, .. } = self.run;
+        for (row, span) in (row..).zip(spans) {
+            let columns = span.columns();
+            let (across, below) = (columns.start as i32 - i32::from(origin[0]), row - i32::from(origin[1]));
+            let values = [0, 1, 2].map(|i: usize| {
+                base[i].wrapping_add(right[i].wrapping_mul(across)).wrapping_add(down[i].wrapping_mul(below))
+            });
+            let pixels = at as usize + columns.start..at as usize + columns.end;
+            if let Some(pixels) = rows.pixels.get_mut(pixels) {
+                cpu::run(Pixelwise { run: self.run, space: self.space, pixels, values });
+            }
+            at += rows.stride;
+        }
     }
 }
 

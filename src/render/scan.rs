@@ -210,6 +210,12 @@ impl Span {
         self.0
     }
 
+    /// The first column, and the one beyond the last; none if it is not beyond the first.
+    #[inline(always)]
+    pub(super) fn ends(self) -> (u32, u32) {
+        (self.0 & 0xffff, self.0 >> 16)
+    }
+
     /// The columns; none if the end is not beyond the first.
     #[inline]
     pub(super) fn columns(self) -> Range<usize> {

@@ -10,6 +10,7 @@
 use super::canvas::ColorSpace;
 use super::lanes::LANES;
 use super::measure::{Colors, Measures, Places, place};
+use super::near::LARGEST;
 use super::piece::{Patch, Piece, Pieces};
 use super::run::{Way, clamped};
 use super::scan::{Outline, ROWS, Span, Turning};
@@ -43,7 +44,12 @@ impl Pieces {
     fn push_placed(&mut self, making: &Making<'_>, polygons: &Polygons, places: &Places, measures: &mut Measures) {
         let (mut clamped_colors, mut ways) = (None, [Way::Chunks; LANES]);
         for lane in (0..polygons.count).filter(|&lane| polygons.are_beyond[lane]) {
-            let (way, colors) = clamped(&polygons.colors(lane), making.space);
+            // A corner of the tet may be beyond, and what is cut out of it not.
+            let colors = polygons.colors(lane);
+            if colors.iter().all(|&color| making.space.holds(making.space.to_rgb(color))) {
+                continue;
+            }
+            let (way, colors) = clamped(&colors, making.space);
             ways[lane] = way;
             let corners: &mut Colors = clamped_colors.get_or_insert(polygons.colors);
             for (corner, color) in corners.iter_mut().zip(colors) {
@@ -73,8 +79,10 @@ impl Pieces {
             let (row, end_row) = (measures.row[lane] as u16, measures.end_row[lane] as u16);
             let piece = if usize::from(end_row - row) > ROWS {
                 // Looked up row by row when it is painted.
-                self.tall.push(outline());
-                Piece::tall(measures.run(lane, way), end_row, self.tall.len() - 1)
+                self.tall.push(measures.sides(lane));
+                self.outlines.push(outline());
+                let is_near = measures.extent[lane] <= LARGEST;
+                Piece::tall(measures.run(lane, way), end_row, is_near, self.tall.len() - 1)
             } else {
                 let cover = measures.cover(lane);
                 if !making.antialias && Span::are_empty(&cover) {
