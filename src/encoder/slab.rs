@@ -148,7 +148,8 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             duration: EncoderConfig::KEY_INT_MAX.end() + 1,
             subpixel_bits: header.subpixel_bits,
         };
-        let has_stages = config.kept_frames() == u32::MAX && config.target_error <= 0.0;
+        let is_whole = config.kept_frames() == u32::MAX;
+        let has_stages = is_whole && config.target_error <= 0.0;
         let refits = if has_stages { config.refits } else { 0 };
         Ok(Self {
             ratio: config.simplification_ratio,
@@ -166,6 +167,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             simplify_params: SimplifyParams {
                 max_extent_frames: config.window,
                 topology: labels::topology(config.topology, false),
+                improve_at: labels::improve_at(config.topology, is_whole),
                 // Made of colour errors, so no measure for distances.
                 surface_weight: match config.error_metric {
                     ErrorMetric::Color => SimplifyParams::default().surface_weight,

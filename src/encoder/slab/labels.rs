@@ -7,9 +7,9 @@ use crate::encoder::TopologyRule;
 use crate::vectorize::simplify::{SimplifyParams, Topology, WedgeQuadric};
 use crate::video::{Frame, LabelPlane};
 
-/// [`SimplifyParams::improve_at`] where labels differ, for the window: collapses jam most when few vertices are left. Flat
-/// between 0.8 and 0.95 (docs/benchmarks.md).
-const CUT_IMPROVE_AT: f32 = 0.9;
+/// [`SimplifyParams::improve_at`] for the window: collapses jam most when few vertices are left. Flat between 0.8 and 0.95
+/// (docs/benchmarks.md).
+const IMPROVE_AT: f32 = 0.9;
 
 /// The same for runs, which are dense: rounds take long and collapses are many.
 const RUN_IMPROVE_AT: f32 = 0.3;
@@ -29,9 +29,8 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let factor = self.flatness.factor();
         self.fit_params.flatness = factor;
         self.simplify_params.topology = topology(self.topology, self.is_cut);
-        // The paper's simplification, strict or free, knows no more than collapses.
         if self.topology == TopologyRule::Auto {
-            self.simplify_params.improve_at = CUT_IMPROVE_AT;
+            self.simplify_params.improve_at = improve_at(self.topology, true);
             self.simplify_params.spread_weight = factor * SimplifyParams::default().spread_weight;
         }
     }
@@ -41,6 +40,12 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let params = self.simplify_params;
         SimplifyParams { improve_at: params.improve_at.min(RUN_IMPROVE_AT), ..params }
     }
+}
+
+/// [`SimplifyParams::improve_at`] of a window, which gains most where it holds the slab or labels differ. The paper's
+/// simplification, strict or free, knows no more than collapses.
+pub(super) fn improve_at(rule: TopologyRule, is_worth_it: bool) -> f32 {
+    if rule == TopologyRule::Auto && is_worth_it { IMPROVE_AT } else { 0.0 }
 }
 
 /// What is kept of the topology of labels, as far as there are any.
