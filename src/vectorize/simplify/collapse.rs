@@ -299,7 +299,7 @@ impl<Q: WedgeQuadric> Simplifier<'_, Q> {
         };
         let Some(proposal) = proposal else { return self.put_back(bucket, entry) };
         let is_free = self.params.topology == Topology::Free || entry.paid || proposal.is_priced;
-        match if is_free { Ok(()) } else { self.mesh.check_link(u, v, &mut self.marks) } {
+        match if is_free { Ok(()) } else { self.mesh.check_link(u, v, self.params.topology, &mut self.marks) } {
             Ok(()) => self.perform(u, v, proposal),
             Err(refusal) => {
                 self.report.refusals.note(refusal);

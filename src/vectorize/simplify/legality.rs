@@ -187,14 +187,14 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
     /// The link condition on the surfaces between labels: a vertex that they join to both ends must share a face of them
     /// with both, and no face may lie between the same two vertices as seen from both ends. Dey, Edelsbrunner, Guha,
     /// Nekhayev, "Topology preserving edge contraction", 1999. Inside of labels positive tets are all that is to be kept.
-    pub(super) fn check_link(&self, u: u32, v: u32, marks: &mut Marks) -> Result<(), Refusal> {
+    pub(super) fn check_link(&self, u: u32, v: u32, topology: Topology, marks: &mut Marks) -> Result<(), Refusal> {
         if [u, v].iter().any(|&w| self.wedges(w).count() == 1) {
             return Ok(());
         }
         let (near, shared) = marks.two();
         let [mut at_u, mut at_v] = std::mem::take(&mut marks.faces);
-        self.surface_faces(u, &mut at_u);
-        self.surface_faces(v, &mut at_v);
+        self.surface_faces(u, topology, &mut at_u);
+        self.surface_faces(v, topology, &mut at_v);
         at_v.iter().for_each(|face| face.ends().into_iter().for_each(|w| marks.set(w, near)));
         let common = at_v.iter().filter(|face| face.ends().contains(&u));
         common.for_each(|face| face.ends().into_iter().for_each(|w| marks.set(w, shared)));
@@ -205,8 +205,9 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         if is_linked { Ok(()) } else { Err(Refusal::Link) }
     }
 
-    /// The faces between labels at `v`, ascending.
-    fn surface_faces(&self, v: u32, faces: &mut Vec<SurfaceFace>) {
+    /// The faces at `v` between labels, ascending. To be strict, the sides of the box are one more label (§V-B): what lies at
+    /// them could vanish into them.
+    fn surface_faces(&self, v: u32, topology: Topology, faces: &mut Vec<SurfaceFace>) {
         faces.clear();
         for &tet in self.stars.star(v) {
             let (corners, label) = (self.tets[tet as usize], self.labels[tet as usize]);
@@ -215,13 +216,16 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
             faces.extend([SurfaceFace::new(a, b, label), SurfaceFace::new(b, c, label), SurfaceFace::new(c, a, label)]);
         }
         faces.sort_unstable_by_key(|face| face.key);
-        let mut kept = 0;
-        for n in 1..faces.len() {
-            let [face, other] = [faces[n - 1], faces[n]];
-            if face.key == other.key && face.label != other.label {
-                faces[kept] = other;
+        let (mut kept, mut n) = (0, 0);
+        while n < faces.len() {
+            let across = faces.get(n + 1).filter(|other| other.key == faces[n].key);
+            let is_surface = across.map_or(topology == Topology::Strict, |other| other.label != faces[n].label);
+            let step = 1 + usize::from(across.is_some());
+            if is_surface {
+                faces[kept] = faces[n];
                 kept += 1;
             }
+            n += step;
         }
         faces.truncate(kept);
     }
