@@ -259,7 +259,7 @@ impl EncoderConfig {
         (vertices / a_frame - 1.0) as u32
     }
 
-    /// The sequence header of streams made with these settings.
+    /// The sequence header of streams made with these settings; slabs that begin with labels have finer positions.
     pub fn header(&self) -> SequenceHeader {
         SequenceHeader {
             width: self.width,

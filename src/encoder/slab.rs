@@ -12,7 +12,7 @@ use super::quantize::{color_steps, rounded_rms};
 use super::readiness::hops;
 use super::runs::{Run, Runs};
 use super::{EncodeError, EncoderConfig, ErrorMetric, TopologyRule};
-use crate::bitstream::{MAX_RINGS, Packet, SlabWriter, rings};
+use crate::bitstream::{MAX_RINGS, Packet, SequenceHeader, SlabWriter, rings};
 use crate::mesh::{Domain, StarTable, TetMesh};
 use crate::vectorize::fit::{FitParams, FitReport, FitRequest, fit};
 use crate::vectorize::lattice::AdaptiveLattice;
@@ -139,8 +139,12 @@ pub(super) struct SlabEncoder<Q> {
 }
 
 impl<Q: WedgeQuadric> SlabEncoder<Q> {
-    pub(super) fn try_new(config: &EncoderConfig, first_frame: u64, error_gain: f64) -> Result<Self, EncodeError> {
-        let header = config.header();
+    pub(super) fn try_new(
+        config: &EncoderConfig,
+        header: SequenceHeader,
+        first_frame: u64,
+        error_gain: f64,
+    ) -> Result<Self, EncodeError> {
         let domain = Domain {
             width: config.width,
             height: config.height,
