@@ -34,10 +34,6 @@ use crate::video::Frame;
 /// drawings still gain by theirs (docs/benchmarks.md).
 const BORDER_A_VERTEX: f32 = 64.0;
 
-/// Binary digits of a position after the point in slabs that begin with labels, where places are what is to be seen: of drawings in
-/// motion one more than usual is worth 1.3 dB at 8x, and takes no more bytes, as colours need not make up for it.
-const CUT_SUBPIXEL_BITS: u8 = 4;
-
 /// Why the encoder refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum EncodeError {
@@ -232,10 +228,7 @@ impl Encoder {
     }
 
     fn new_slab(&self, is_cut: bool) -> Result<Box<dyn WindowEncoder>, EncodeError> {
-        let (config, mut header) = (&self.slab_config, self.slab_config.header());
-        if is_cut {
-            header.subpixel_bits = CUT_SUBPIXEL_BITS;
-        }
+        let (config, header) = (&self.slab_config, self.slab_config.slab_header(is_cut));
         Ok(match config.error_metric {
             ErrorMetric::Color => {
                 Box::new(SlabEncoder::<ColorQuadric>::try_new(config, header, self.next_frame, self.error_gain)?)

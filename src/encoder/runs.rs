@@ -142,8 +142,7 @@ fn with_halves(planes: Vec<Plane>, first: u32, unit: i32) -> (Vec<i64>, Vec<Plan
     const CELL: usize = AdaptiveLattice::MAX_STEPS as usize;
     let steps = planes.len() - 1;
     let room = if steps == CELL { steps } else { CELL.saturating_sub(steps) };
-    let is_worth_it =
-        room <= steps && is_cut(&planes) && planes.windows(2).any(|pair| is_moving(&pair[0].1, &pair[1].1));
+    let is_worth_it = room <= steps && planes.windows(2).any(|pair| is_moving(&pair[0].1, &pair[1].1));
     let halves = if is_worth_it { room } else { 0 };
     let unit = i64::from(unit);
     let time = |n: usize| (i64::from(first) + n as i64) * unit;

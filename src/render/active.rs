@@ -74,14 +74,11 @@ impl Active {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::random;
 
     #[test]
     fn every_way_through_time_finds_what_a_search_finds() {
-        let mut seed = 9u64;
-        let mut random = |end: u64| {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 33) % end
-        };
+        let mut random = random::below::<u64>(9);
         let mut spans = Vec::new();
         let mut active = Active::new(64);
         let mut t = 0;

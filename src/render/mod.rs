@@ -28,6 +28,8 @@ mod pack;
 mod paint;
 mod parallel;
 mod piece;
+#[cfg(test)]
+mod random;
 mod refiner;
 mod rings;
 mod run;

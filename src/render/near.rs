@@ -120,15 +120,12 @@ mod tests {
     use super::super::grid::{GRID_BITS, GridPoint};
     use super::super::scan::{Outline, spans};
     use super::*;
+    use crate::render::random;
 
     /// Where it says something it is what double precision says, and mostly it does.
     #[test]
     fn spans_are_the_exact_ones() {
-        let mut seed = 7u64;
-        let mut random = |end: i64| {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 33) as i64 % end
-        };
+        let mut random = random::below::<i64>(7);
         const ONE: i64 = 1 << GRID_BITS;
         let (mut seen, mut unsure, mut polygons) = (0, 0, 0);
         while polygons < 3000 {

@@ -242,6 +242,7 @@ pub(super) fn scan(outline: &Outline, width: i32, rows: Range<i32>, mut take: im
 mod tests {
     use super::super::grid::{GRID_BITS, is_positive};
     use super::*;
+    use crate::render::random;
 
     const ONE: i64 = 1 << GRID_BITS;
 
@@ -313,11 +314,7 @@ mod tests {
     /// In floating point where polygons are small, in integers where they are not: the same answer.
     #[test]
     fn convex_is_exact_at_every_size() {
-        let mut seed = 5u64;
-        let mut random = |end: i64| {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 33) as i64 % end
-        };
+        let mut random = random::below::<i64>(5);
         let mut seen = [0; 2];
         for n in 0..4000 {
             // Close to a line, so that turns are as often 0 or barely something else.

@@ -133,6 +133,7 @@ pub(super) mod tests {
     use super::super::view::Viewport;
     use super::*;
     use crate::mesh::Domain;
+    use crate::render::random;
 
     /// The run of a triangle with these colours in the channels of a canvas, and whether one is beyond what it holds.
     pub(in super::super) fn run_of(
@@ -158,11 +159,7 @@ pub(super) mod tests {
     /// Wide instructions change nothing: neither where polygons are cut nor what is painted.
     #[test]
     fn pieces_are_the_same_with_and_without_wide_instructions() {
-        let mut seed = 11u64;
-        let mut random = |end: i32| {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            ((seed >> 33) % end as u64) as i32
-        };
+        let mut random = random::below::<i32>(11);
         let domain = Domain { width: 640, height: 360, duration: 4, subpixel_bits: 3 };
         let view = View::new(&domain, Viewport::whole(&domain), (1000, 563));
         let mut node = |[x, y]: [i32; 2], size: i32| {

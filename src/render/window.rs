@@ -59,16 +59,13 @@ mod tests {
 
     use super::super::complex::Node;
     use super::*;
+    use crate::render::random;
     use crate::video::Label;
 
     /// Whatever the viewport, what it leaves out lies outside of it.
     #[test]
     fn tets_left_out_lie_outside() {
-        let mut seed = 3u64;
-        let mut random = |end: i32| {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            ((seed >> 33) % end as u64) as i32
-        };
+        let mut random = random::below::<i32>(3);
         for (width, height) in [(64, 48), (16384, 9000)] {
             let domain = Domain { width, height, duration: 4, subpixel_bits: 3 };
             let far = domain.extent();

@@ -109,8 +109,7 @@ impl Faces {
         let most = if faces.len() > FEW { 1 } else { FEW };
         let mut left = faces;
         while let [one, rest @ ..] = left {
-            let other = rest.iter().take(most).position(|other| other.others == one.others);
-            let pair = match other {
+            let pair = match rest.iter().take(most).position(|other| other.others == one.others) {
                 Some(place) => {
                     // The first of the rest is looked at next, so it takes the place of the one that was found.
                     let other = rest[place];
@@ -119,11 +118,8 @@ impl Faces {
                     Some(other.face)
                 }
                 None => {
-                    let found = self.meet(lowest, *one);
-                    let (face, pair) = (one.face, found);
                     left = rest;
-                    link(tets, face, pair);
-                    continue;
+                    self.meet(lowest, *one)
                 }
             };
             link(tets, one.face, pair);

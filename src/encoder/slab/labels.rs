@@ -29,8 +29,8 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let factor = self.flatness.factor();
         self.fit_params.flatness = factor;
         self.simplify_params.topology = topology(self.topology, self.is_cut);
+        self.simplify_params.improve_at = improve_at(self.topology, true);
         if self.topology == TopologyRule::Auto {
-            self.simplify_params.improve_at = improve_at(self.topology, true);
             self.simplify_params.spread_weight = factor * SimplifyParams::default().spread_weight;
         }
     }

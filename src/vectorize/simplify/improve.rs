@@ -25,4 +25,9 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         let reach = times.iter().max().zip(times.iter().min()).map_or(0, |(last, first)| last - first);
         if form.volume6 >= limits.min_volume6 && reach <= limits.max_extent { form.shape() } else { -1.0 }
     }
+
+    /// The same of a tet as it is, or of one that could be.
+    pub(super) fn quality_of(&self, corners: [u32; 4], limits: &Limits) -> f32 {
+        self.quality(corners.map(|v| self.places[v as usize]), limits)
+    }
 }

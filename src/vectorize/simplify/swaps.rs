@@ -24,9 +24,9 @@ const BEST: f32 = 1.0;
 impl<Q: WedgeQuadric> WorkMesh<Q> {
     /// Swaps where that changes colours by no more than `price` each time.
     pub(super) fn swap(&mut self, limits: &Limits, price: f32) {
-        let quality = |&corners: &[u32; 4]| match corners {
+        let quality = |corners: &[u32; 4]| match corners {
             [NONE, ..] => BEST,
-            corners => self.quality(corners.map(|v| self.places[v as usize]), limits),
+            corners => self.quality_of(*corners, limits),
         };
         let qualities = self.tets.iter().map(quality).collect();
         let (old, ring, new) = Default::default();
@@ -71,7 +71,7 @@ impl<Q: WedgeQuadric> Swapper<'_, Q> {
     }
 
     fn quality(&self, corners: [u32; 4]) -> f32 {
-        self.mesh.quality(corners.map(|v| self.mesh.places[v as usize]), self.limits)
+        self.mesh.quality_of(corners, self.limits)
     }
 
     /// Removes an edge if other tets in its place are better than `tet`, the worst there.
@@ -172,7 +172,7 @@ impl<Q: WedgeQuadric> Swapper<'_, Q> {
                 mesh.tets.len() as u32 - 1
             });
             mesh.tets[tet as usize] = corners;
-            qualities[tet as usize] = mesh.quality(corners.map(|v| mesh.places[v as usize]), self.limits);
+            qualities[tet as usize] = mesh.quality_of(corners, self.limits);
             corners.iter().for_each(|&v| mesh.stars.add(v, tet));
         }
     }

@@ -93,8 +93,9 @@ impl Content {
 
     /// The labels of the next frame.
     pub(super) fn push(&mut self, frame: &Frame) -> LabelPlane {
+        // Of texture nothing more is asked: its labels are one.
         if let Some((before, _, labels)) = &self.before
-            && before == frame
+            && (self.is_texture || before == frame)
         {
             return labels.clone();
         }
