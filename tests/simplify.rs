@@ -353,3 +353,17 @@ fn same_mesh_with_any_number_of_threads() {
     assert_eq!(meshes[0], meshes[1]);
     assert_eq!(meshes[0], meshes[2]);
 }
+
+#[test]
+fn what_counts_more_at_an_end_keeps_more_vertices_there() {
+    let clip = Clip::new([20, 20, 7], textured, |_, _, _| 0);
+    let at_ends = |end_weights| {
+        let params = SimplifyParams { end_weights, ..SimplifyParams::default() };
+        let (mesh, _) = clip.simplified::<ColorQuadric>(300, &params);
+        let last = clip.domain.duration as i32 * clip.domain.unit();
+        [0, last].map(|t| mesh.positions.iter().filter(|p| p.z == t).count() as f64)
+    };
+    let (even, first, last) = (at_ends([0.0, 0.0]), at_ends([2.0, 0.0]), at_ends([0.0, 2.0]));
+    assert!(first[0] > 1.2 * even[0] && last[1] > 1.2 * even[1], "{even:?}, {first:?}, {last:?}");
+    assert!(first[1] < 1.1 * even[1] && last[0] < 1.1 * even[0], "{even:?}, {first:?}, {last:?}");
+}

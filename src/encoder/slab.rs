@@ -43,6 +43,10 @@ struct BlockPass {
     ratio: f64,
 }
 
+/// [`SimplifyParams::end_weights`] of a plane that is shown: half a frame makes up for the side that it does not have, the rest
+/// for tets that reach into it from one side alone (docs/benchmarks.md).
+const END_WEIGHT: f32 = 2.0;
+
 /// The part of the error allowed that blocks of a run may make, where the error decides.
 const RUN_ERROR: f32 = 0.25;
 
@@ -168,17 +172,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             topology: config.topology,
             is_cut: false,
             flatness: Flatness::default(),
-            simplify_params: SimplifyParams {
-                max_extent_frames: config.window,
-                topology: labels::topology(config.topology, false),
-                improve_at: labels::improve_at(config.topology, is_whole),
-                // Made of colour errors, so no measure for distances.
-                surface_weight: match config.error_metric {
-                    ErrorMetric::Color => SimplifyParams::default().surface_weight,
-                    ErrorMetric::Paper => 0.0,
-                },
-                ..SimplifyParams::default()
-            },
+            simplify_params: simplify_params(config, is_whole),
             fit_params: FitParams {
                 subdivision_levels: config.subdivision_levels,
                 position_iterations: config.position_steps,
@@ -432,6 +426,7 @@ impl<Q: WedgeQuadric> WindowEncoder for SlabEncoder<Q> {
 
     fn finish(mut self: Box<Self>, end: SlabEnd, observer: &mut Observer) -> Result<FinishedSlab, EncodeError> {
         let frames = self.planes;
+        let is_shown = matches!(end, SlabEnd::Held);
         match end {
             SlabEnd::Joined(frame, labels) => self.take(frame, labels),
             SlabEnd::Held if frames == 1 => {
@@ -443,12 +438,32 @@ impl<Q: WedgeQuadric> WindowEncoder for SlabEncoder<Q> {
             }
             SlabEnd::Held => {}
         }
+        if is_shown {
+            self.simplify_params.end_weights[1] = self.simplify_params.end_weights[0];
+        }
         let duration = self.planes - 1;
         self.work.set_duration(duration);
         self.committed.domain.duration = duration;
         let packets = self.advance(Some(frames), observer)?;
         let vertices = self.committed.positions.len() as u64;
         Ok(FinishedSlab { packets, vertices, error_gain: self.error_gain, error: self.proof.error() })
+    }
+}
+
+/// How a slab is simplified as long as nothing is known of its labels.
+fn simplify_params(config: &EncoderConfig, is_whole: bool) -> SimplifyParams {
+    // The paper's metric is no measure for distances, nor does it know more of one plane than of another.
+    let (surface_weight, first_plane) = match config.error_metric {
+        ErrorMetric::Color => (SimplifyParams::default().surface_weight, END_WEIGHT),
+        ErrorMetric::Paper => (0.0, 0.0),
+    };
+    SimplifyParams {
+        max_extent_frames: config.window,
+        topology: labels::topology(config.topology, false),
+        improve_at: labels::improve_at(config.topology, is_whole),
+        surface_weight,
+        end_weights: [first_plane, 0.0],
+        ..SimplifyParams::default()
     }
 }
 

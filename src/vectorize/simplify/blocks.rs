@@ -211,7 +211,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
                 SHARED => *shared.entry(v).or_insert_with(|| self.push_vertex(run.positions[v.index()], true)),
                 number => number,
             });
-            self.add_tet(run, tet as usize, corners);
+            self.add_tet(run, tet as usize, corners, params);
         }
         self.spread(0, params.spread_weight);
         for (&vertex, number) in part.vertices.iter().zip(0..) {

@@ -37,6 +37,9 @@ pub struct SimplifyParams {
     pub min_volume6: f32,
     /// Least mean ratio of a tet, between 0 (flat) and 1 (regular).
     pub min_shape: f32,
+    /// What errors of colour in the first and the last plane of the box count beside those in the volume, in frames. The plane of
+    /// any other frame has half a frame's volume before and half a frame's after it.
+    pub end_weights: [f32; 2],
     /// Most frames that a tet may reach through: bounds how long a packet can wait for its tets.
     pub max_extent_frames: u32,
     /// How strictly the topology of labels is kept.
@@ -68,6 +71,7 @@ impl Default for SimplifyParams {
             surface_weight: 1.0,
             min_volume6: 1.0 / 16.0,
             min_shape: 0.03,
+            end_weights: [0.0; 2],
             max_extent_frames: 10,
             topology: Topology::Free,
             topology_price: 0.5,

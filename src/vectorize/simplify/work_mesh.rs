@@ -108,7 +108,7 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         let first_vertex = self.vertices.len();
         let vertices: Vec<u32> = run.positions.iter().map(|position| place(self, position)).collect();
         for tet in 0..run.tets.len() {
-            self.add_tet(run, tet, run.tet_vertices(tet).map(|v| vertices[v.index()]));
+            self.add_tet(run, tet, run.tet_vertices(tet).map(|v| vertices[v.index()]), params);
         }
         self.spread(first_vertex, params.spread_weight);
         let surfaces = surface_quadrics(run, 1, params.surface_weight);
@@ -134,8 +134,9 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         self.vertices.len() as u32 - 1
     }
 
-    /// Adds a tet of `run`, whose corners are `corners` here, with its colours' quadrics.
-    pub(super) fn add_tet(&mut self, run: &TetMesh, tet: usize, corners: [u32; 4]) {
+    /// Adds a tet of `run`, whose corners are `corners` here, with its colours' quadrics, and those of its face in the first or the
+    /// last plane.
+    pub(super) fn add_tet(&mut self, run: &TetMesh, tet: usize, corners: [u32; 4], params: &SimplifyParams) {
         let label = run.tet_label(tet);
         self.tets.push(corners);
         self.labels.push(label);
@@ -146,6 +147,14 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         for (vertex, color) in corners.into_iter().zip(colors) {
             let field = TetField { gradient, color, weight: 0.25 * volume };
             self.wedge_mut(vertex, label).quadric.add(&Q::of_tet(&field));
+        }
+        for (end, weight) in [Sides::T_LOW, Sides::T_HIGH].into_iter().zip(params.end_weights) {
+            let at_end = corners.map(|v| self.vertices[v as usize].sides.contains(end));
+            let Some(area) = area_of_three(positions, at_end).filter(|_| weight > 0.0) else { continue };
+            for ((vertex, color), _) in corners.into_iter().zip(colors).zip(at_end).filter(|(_, at_end)| *at_end) {
+                let field = TetField { gradient, color, weight: weight * area / 3.0 };
+                self.wedge_mut(vertex, label).quadric.add(&Q::of_tet(&field));
+            }
         }
     }
 
@@ -217,6 +226,13 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         }
         &mut self.surfaces[*slot as usize]
     }
+}
+
+/// The area of the face whose corners are chosen, if three are.
+fn area_of_three(corners: [Vec3; 4], is_chosen: [bool; 4]) -> Option<f32> {
+    let mut chosen = corners.into_iter().zip(is_chosen).filter(|(_, is_chosen)| *is_chosen).map(|(corner, _)| corner);
+    let [a, b, c] = [chosen.next()?, chosen.next()?, chosen.next()?];
+    Some(0.5 * (b - a).cross(c - a).length())
 }
 
 /// Label of a first wedge that is not set yet.
