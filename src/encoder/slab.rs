@@ -33,6 +33,9 @@ const CUT_RUN_RATIO: f64 = 4.0;
 /// How many times the vertices that a window is to have it may grow to before its blocks are simplified.
 const GROWTH: f64 = 1.5;
 
+/// The same where labels differ, and a window has twice the vertices: memory before time.
+const CUT_GROWTH: f64 = 1.2;
+
 /// The same for blocks of the window at the slab's end, pass by pass, each along other lines ([`BlockGoal::shift`]): the
 /// last pass, over the whole, runs on one core, so little is left to it.
 const WINDOW_PASSES: [BlockPass; 2] = [BlockPass { shift: 0.5, ratio: 1.5 }, BlockPass { shift: 0.0, ratio: 1.1 }];
@@ -54,8 +57,8 @@ const RUN_ERROR: f32 = 0.25;
 /// 140 to 180 on natural clips. Where it starts; each fit corrects it.
 pub(super) const ERROR_GAIN: f64 = 150.0;
 
-/// Most vertices that are fitted at once.
-const FIT_VERTICES: usize = 150_000;
+/// Most vertices that are fitted at once: more take more memory, and no less time.
+const FIT_VERTICES: usize = 50_000;
 
 /// How a slab ends.
 #[derive(Debug)]
@@ -260,7 +263,8 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let unfrozen = Unfrozen { low: self.frozen, high };
         if is_whole && frames.is_none() {
             // Nothing is handed on before the slab ends: only memory is at stake, and that roughly.
-            if self.work.vertex_count() as f64 > GROWTH * goal.vertices_in_window as f64 {
+            let growth = if self.is_cut { CUT_GROWTH } else { GROWTH };
+            if self.work.vertex_count() as f64 > growth * goal.vertices_in_window as f64 {
                 observer.tell(Event::Began(Stage::Simplify));
                 self.simplify_blocks(unfrozen, goal.vertices_in_window, 0.5, observer);
                 observer.tell(Event::Ended);

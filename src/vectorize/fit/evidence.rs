@@ -48,7 +48,7 @@ impl Evidence {
         let view = View { planes, marks: &marks, beside };
         let moments = measure(model, points, colors, &view, self.moments);
         let pieces = find_pieces(model, points, &view);
-        Self { moments, edges: EdgePixels::new(&marks, frames, pieces, &crossings), beside }
+        Self { moments, edges: EdgePixels::new(&marks, frames, &pieces, &crossings), beside }
     }
 
     /// Number of pixels that count.

@@ -111,8 +111,9 @@ pub(super) fn measure(
     buffer
 }
 
-/// The parts of marked pixels that tets cover, each with the pixel's number, in the order of the tets.
-pub(super) fn find_pieces(model: &Model, points: &[IVec3], view: &View<'_>) -> Vec<(u32, Piece)> {
+/// The parts of marked pixels that tets cover, each with the pixel's number, in the order of the tets. (Lists, since they take
+/// the most memory of all.)
+pub(super) fn find_pieces(model: &Model, points: &[IVec3], view: &View<'_>) -> Vec<Vec<(u32, Piece)>> {
     if view.marks.count() == 0 {
         return Vec::new();
     }
@@ -123,7 +124,7 @@ pub(super) fn find_pieces(model: &Model, points: &[IVec3], view: &View<'_>) -> V
         }
         pieces
     };
-    parallel::map(model.tets.len().div_ceil(TETS_PER_TASK), task).concat()
+    parallel::map(model.tets.len().div_ceil(TETS_PER_TASK), task)
 }
 
 impl View<'_> {
@@ -200,7 +201,7 @@ impl View<'_> {
                 marks.marked(y, strip.columns(frame.width()), |x, row| {
                     if let Some((area, centre)) = strip.in_column(x) {
                         let share = weights.at(centre.extend(plane)) * area as f32;
-                        pieces.push((row, Piece { tet, share }));
+                        pieces.push((row, Piece { tet, share: share.to_array() }));
                     }
                 });
             }

@@ -13,7 +13,6 @@ use super::edges::Slopes;
 use super::evidence::Evidence;
 use super::model::Model;
 use super::parallel;
-use super::smoothness::color_gradient;
 use super::sparse::System;
 
 /// Parts in which sums over tets are collected. Part of the result, so never derived from the machine.
@@ -41,25 +40,15 @@ pub(super) struct NormalEquations<'a> {
     color_inverse: Vec<f32>,
     /// Inverse of the vertices' diagonal blocks; empty where positions are held.
     position_inverse: Vec<Mat3>,
-    /// None where positions are held.
-    motion: Option<Motion>,
-}
-
-/// How colours answer to displacements.
-struct Motion {
-    /// Colour gradients of the model's tets.
-    gradients: Vec<Mat3>,
-    /// How boundaries answer.
-    slopes: Slopes,
-    /// Colours of the nodes.
-    nodes: Vec<Vec3>,
+    /// How colours answer to displacements. None where positions are held.
+    slopes: Option<Slopes>,
 }
 
 impl<'a> NormalEquations<'a> {
     /// Colours alone. `mask` and `damping` (in pixels) have an entry per wedge.
     pub(super) fn of_colors(model: &'a Model, evidence: &'a Evidence, mask: Vec<Vec3>, damping: Vec<f32>) -> Self {
         let (color_inverse, position_inverse) = (Vec::new(), Vec::new());
-        let mut system = Self { model, evidence, mask, damping, color_inverse, position_inverse, motion: None };
+        let mut system = Self { model, evidence, mask, damping, color_inverse, position_inverse, slopes: None };
         system.color_inverse = system.invert_color_diagonal();
         system
     }
@@ -73,14 +62,9 @@ impl<'a> NormalEquations<'a> {
         position_damping: &PositionDamping,
     ) -> Self {
         let mut system = Self::of_colors(model, evidence, mask, color_damping);
-        let gradients = parallel::map(model.tets.len(), |tet| {
-            let corners = model.tet_points(tet).map(|p| points[p]);
-            color_gradient(corners, model.tets[tet].map(|n| node_colors[n as usize]), model.fine_unit)
-        });
-        let slopes = Slopes::new(&model.interfaces, points);
-        let motion = Motion { gradients, slopes, nodes: node_colors.to_vec() };
-        system.damp_and_invert_positions(&motion, position_damping);
-        system.motion = Some(motion);
+        let slopes = evidence.edges.slopes(model, points, node_colors);
+        system.damp_and_invert_positions(&slopes, position_damping);
+        system.slopes = Some(slopes);
         system
     }
 
@@ -115,15 +99,15 @@ impl<'a> NormalEquations<'a> {
     ) -> Vec<Vec3> {
         let (model, nodes) = (self.model, self.model.node_point.len());
         let (moments, edges) = (&self.evidence.moments, &self.evidence.edges);
-        let points = if self.motion.is_none() { 0 } else { model.positions.rows() };
+        let points = if self.slopes.is_none() { 0 } else { model.positions.rows() };
         let mut sums = collect(moments.len(), nodes + points, |m, out: &mut [Vec3]| {
             let tet = moments[m].tet as usize;
             let change = corner_change(m);
             for (corner, &node) in model.tets[tet].iter().enumerate() {
                 out[node as usize] += change[corner];
             }
-            if let Some(motion) = &self.motion {
-                let transposed = motion.gradients[tet].transpose();
+            if let Some(slopes) = &self.slopes {
+                let transposed = slopes.gradients[tet].transpose();
                 for (corner, point) in model.tet_points(tet).into_iter().enumerate() {
                     out[nodes + point] -= transposed * change[corner];
                 }
@@ -132,8 +116,8 @@ impl<'a> NormalEquations<'a> {
         add_all(&mut sums, edges.len(), |row, out: &mut [Vec3]| {
             let change = change(row);
             edges.color_terms(row, model, |node, weight| out[node] += change * weight);
-            if let Some(motion) = &self.motion {
-                motion.terms(row, self, |point, matrix| out[nodes + point] += matrix.transpose() * change);
+            if let Some(slopes) = &self.slopes {
+                edges.change_back(row, (model, slopes), change, |point, part| out[nodes + point] += part);
             }
         });
         let mut out = model.colors_back.times(&sums[..nodes]);
@@ -162,19 +146,19 @@ impl<'a> NormalEquations<'a> {
         parallel::map(self.wedges(), |wedge| 1.0 / (diagonal(wedge) + self.damping[wedge]).max(f32::MIN_POSITIVE))
     }
 
-    fn damp_and_invert_positions(&mut self, motion: &Motion, damping: &PositionDamping) {
+    fn damp_and_invert_positions(&mut self, slopes: &Slopes, damping: &PositionDamping) {
         let (model, wedges) = (self.model, self.wedges());
         let (moments, edges) = (&self.evidence.moments, &self.evidence.edges);
         let mut points = collect(moments.len(), model.positions.rows(), |m, out: &mut [Block]| {
             let tet = moments[m].tet as usize;
-            let block = Block::of(&motion.gradients[tet]);
+            let block = Block::of(&slopes.gradients[tet]);
             for (corner, point) in model.tet_points(tet).into_iter().enumerate() {
                 out[point] += block.scaled(moments[m].diagonal(corner));
             }
         });
         add_all(&mut points, edges.len(), |row, out: &mut [Block]| {
             let mut matrices = Terms::<Mat3>::default();
-            motion.terms(row, self, |point, matrix| matrices.add(point, matrix));
+            edges.position_terms(row, (model, slopes), |point, matrix| matrices.add(point, matrix));
             matrices.for_each(|point, matrix| out[point] += Block::of(&matrix));
         });
         let rows = parallel::map(model.positions_back.rows(), |vertex| {
@@ -185,13 +169,6 @@ impl<'a> NormalEquations<'a> {
         });
         self.damping.extend(rows.iter().map(|r| r.0));
         self.position_inverse = rows.into_iter().map(|r| r.1).collect();
-    }
-}
-
-impl Motion {
-    fn terms(&self, row: usize, system: &NormalEquations<'_>, part: impl FnMut(usize, Mat3)) {
-        let motion = (system.model, &self.gradients[..], &self.slopes);
-        system.evidence.edges.position_terms(row, motion, &self.nodes, part);
     }
 }
 
@@ -216,23 +193,21 @@ impl System for NormalEquations<'_> {
     fn times(&self, x: &[Vec3]) -> Vec<Vec3> {
         let (colors, positions) = x.split_at(self.wedges());
         let nodes = self.model.colors.times(colors);
-        let points = if self.motion.is_none() { Vec::new() } else { self.model.positions.times(positions) };
+        let points = if self.slopes.is_none() { Vec::new() } else { self.model.positions.times(positions) };
         let mut out = self.adjoint(
             |m| {
                 let mut u = self.corner_values(m, &nodes);
                 let tet = self.evidence.moments[m].tet as usize;
-                if let Some(motion) = &self.motion {
+                if let Some(slopes) = &self.slopes {
                     let corners = self.model.tet_points(tet);
-                    u.iter_mut().zip(corners).for_each(|(u, p)| *u -= motion.gradients[tet] * points[p]);
+                    u.iter_mut().zip(corners).for_each(|(u, p)| *u -= slopes.gradients[tet] * points[p]);
                 }
                 self.evidence.moments[m].product(u)
             },
             |row| {
-                let mut change = self.evidence.edges.mean(row, self.model, &nodes);
-                if let Some(motion) = &self.motion {
-                    motion.terms(row, self, |point, matrix| change += matrix * points[point]);
-                }
-                change
+                let edges = &self.evidence.edges;
+                let change = self.slopes.as_ref().map(|slopes| edges.change(row, (self.model, slopes), &points));
+                edges.mean(row, self.model, &nodes) + change.unwrap_or_default()
             },
         );
         parallel::update(&mut out, |i, out| *out += x[i] * self.damping[i]);
