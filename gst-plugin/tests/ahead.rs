@@ -2,9 +2,11 @@
 
 mod pipeline;
 
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use gst::ClockTime;
+use gst::prelude::*;
 use pipeline::{Outcome, encode, init, raw, time_of};
 
 /// Longer than upstream may take for a packet that it has in store.
@@ -88,17 +90,46 @@ fn a_flush_drops_what_waits() {
     assert_eq!(shown(&mut harness), (10..15).collect::<Vec<_>>());
 }
 
-/// What is serialized keeps its place behind the pictures of packets before it.
+/// Other serialized events wait for the pictures of packets before them, which are shown at once.
 #[test]
 fn events_do_not_overtake_pictures() {
     let coded = encode(&raw(10));
     let packets = pictures(&coded);
     let mut harness = harness(&coded);
     push(&mut harness, &packets[..6]);
-    let mut tags = gst::TagList::new();
-    tags.make_mut().add::<gst::tags::Title>(&"behind", gst::TagMergeMode::Append);
-    harness.push_event(gst::event::Tag::new(tags));
+    harness.push_event(gst::event::CustomDownstream::new(gst::Structure::new_empty("still")));
     assert_eq!(shown(&mut harness), (0..6).collect::<Vec<_>>());
+}
+
+/// A parser sends tags between any two packets: they keep their place, but nothing need be shown for them.
+#[test]
+fn tags_wait_among_the_packets() {
+    let coded = encode(&raw(10));
+    let packets = pictures(&coded);
+    let mut harness = harness(&coded);
+    let seen = Arc::new(Mutex::new(Vec::new()));
+    let note = seen.clone();
+    let kinds = gst::PadProbeType::BUFFER | gst::PadProbeType::EVENT_DOWNSTREAM;
+    harness.sinkpad().unwrap().add_probe(kinds, move |_, info| {
+        match &info.data {
+            Some(gst::PadProbeData::Buffer(buffer)) => note.lock().unwrap().push(Some(number(buffer.as_ref()))),
+            Some(gst::PadProbeData::Event(event)) if event.type_() == gst::EventType::Tag => {
+                note.lock().unwrap().push(None);
+            }
+            _ => (),
+        }
+        gst::PadProbeReturn::Ok
+    });
+    push(&mut harness, &packets[..6]);
+    shown(&mut harness);
+    let mut tags = gst::TagList::new();
+    tags.make_mut().add::<gst::tags::Title>(&"between", gst::TagMergeMode::Append);
+    harness.push_event(gst::event::Tag::new(tags));
+    assert!(shown(&mut harness).is_empty(), "nothing is shown for a tag");
+    push(&mut harness, &packets[6..]);
+    harness.push_event(gst::event::Eos::new());
+    let expected: Vec<_> = (0..6).map(Some).chain([None]).chain((6..10).map(Some)).collect();
+    assert_eq!(*seen.lock().unwrap(), expected);
 }
 
 /// Packets before the segment's start may wait; the first picture within does not.

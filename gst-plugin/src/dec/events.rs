@@ -14,15 +14,28 @@ impl TetvecDec {
     /// An event from upstream.
     pub(super) fn sink_event(&self, pad: &gst::Pad, event: gst::Event) -> bool {
         gst::log!(CAT, obj = pad, "Event {event:?}");
+        let is_serialized = event.is_serialized();
+        let handled = self.handle(pad, event);
+        if is_serialized {
+            self.lock_stream().done_with_input();
+        }
+        handled
+    }
+
+    fn handle(&self, pad: &gst::Pad, event: gst::Event) -> bool {
         match event.view() {
             gst::EventView::FlushStart(_) => {
                 self.set_flushing(true);
                 self.forward(pad, event)
             }
             gst::EventView::FlushStop(_) => {
-                self.lock_stream().flush();
+                let queued = self.lock_stream().flush();
                 self.set_flushing(false);
-                self.forward(pad, event)
+                let forwarded = self.forward(pad, event);
+                queued.into_iter().for_each(|event| {
+                    self.push_or_hold(event);
+                });
+                forwarded
             }
             gst::EventView::StreamStart(_) => {
                 self.drain();
@@ -38,6 +51,12 @@ impl TetvecDec {
                 self.drain();
                 self.negotiate_early();
                 self.push_or_hold(event)
+            }
+            // A parser sends many, each time that it knows the bitrate better: so they wait among the packets.
+            gst::EventView::Tag(_) => {
+                self.lock_stream().queue_event(event);
+                self.push_due();
+                true
             }
             _ if event.is_serialized() => {
                 self.finish_pictures();
@@ -153,6 +172,15 @@ impl TetvecDec {
         }
         if let Err(error) = self.negotiate_if_needed() {
             gst::debug!(CAT, imp = self, "Not negotiated yet: {error:?}");
+        }
+    }
+
+    /// Sends the events before which no packet waits.
+    pub(super) fn push_due(&self) {
+        loop {
+            // Not in the loop's condition, where the lock would be held over the push.
+            let Some(event) = self.lock_stream().next_event() else { break };
+            self.push_or_hold(event);
         }
     }
 

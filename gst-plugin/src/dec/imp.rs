@@ -4,7 +4,6 @@
 //! is held over a push, a query or an event, and never one inside the other.
 
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
 
 use gst::glib;
 use gst::prelude::*;
@@ -118,7 +117,7 @@ impl TetvecDec {
             Some(group) => self.play_group(group),
             None => self.show_queued(left),
         };
-        self.lock_stream().urgent.asked = Some(Instant::now());
+        self.lock_stream().done_with_input();
         result
     }
 

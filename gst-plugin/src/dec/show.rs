@@ -14,9 +14,10 @@ use super::timing::{Picture, Span};
 use super::view::Shape;
 
 impl TetvecDec {
-    /// Shows the pictures of queued packets until no more than `left` wait.
+    /// Shows the pictures of queued packets until no more than `left` wait, and sends events behind them.
     pub(super) fn show_queued(&self, left: usize) -> Result<gst::FlowSuccess, gst::FlowError> {
         loop {
+            self.push_due();
             self.check_flow()?;
             let Some((packet, decoded)) = self.lock_stream().receive(left) else { break };
             let number = match self.judge(&packet, decoded) {

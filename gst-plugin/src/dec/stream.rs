@@ -31,6 +31,14 @@ pub(super) enum Decoded {
 /// to ten others: so many are decoded ahead of it while the pictures before it are drawn.
 const AHEAD: usize = 12;
 
+/// What keeps its place in the stream.
+#[derive(Debug)]
+enum Queued {
+    /// Which the decoder has queued, too.
+    Packet(gst::Buffer),
+    Event(gst::Event),
+}
+
 /// If upstream takes longer than this for its next packet, it has none in store.
 const IN_STORE: Duration = Duration::from_millis(5);
 
@@ -41,7 +49,7 @@ pub(super) struct Urgency {
     pub(super) live: bool,
     /// None has been shown since the start or a seek.
     pub(super) first: bool,
-    /// When the last packet was done with.
+    /// When the last packet or event was done with.
     pub(super) asked: Option<Instant>,
 }
 
@@ -65,8 +73,8 @@ pub(super) struct Stream {
     pub(super) after_loss: bool,
     /// Pictures leave at once: packets come when they are made, or none has left since the start or a seek.
     pub(super) urgent: Urgency,
-    /// Packets that the decoder has queued, in order.
-    queued: VecDeque<gst::Buffer>,
+    /// Packets that wait, and events between them.
+    queued: VecDeque<Queued>,
     /// A keyframe has been asked for since the last one came.
     keyframe_requested: bool,
     /// Packets that should have given a picture since the start or a flush.
@@ -102,19 +110,22 @@ impl Stream {
         }
     }
 
-    /// Forgets all that a flush ends: packets, pictures, the segment, and events of them that still wait.
-    pub(super) fn flush(&mut self) {
+    /// Forgets all that a flush ends: packets, pictures, the segment, and events of them that still wait. Hands out events that
+    /// waited between packets, which are of the stream.
+    pub(super) fn flush(&mut self) -> Vec<gst::Event> {
         self.segment = gst::FormattedSegment::new();
         self.discont = true;
         self.after_loss = false;
         self.urgent.first = true;
-        self.queued.clear();
+        let queued = std::mem::take(&mut self.queued);
         self.keyframe_requested = false;
         (self.packets, self.decoded) = (0, 0);
         self.decoder.flush();
         self.schedule.reset();
         self.gop.take();
         self.held.retain(|event| !matches!(event.type_(), gst::EventType::Segment | gst::EventType::Eos));
+        let event = |queued| if let Queued::Event(event) = queued { Some(event) } else { None };
+        queued.into_iter().filter_map(event).collect()
     }
 
     /// Takes new caps.
@@ -165,15 +176,36 @@ impl Stream {
         // What cannot be read is a packet without bytes, which is damaged.
         let data = packet.map_readable().map_or_else(|_| Vec::new(), |map| map.to_vec());
         self.decoder.queue_packet(data);
-        self.queued.push_back(packet);
+        self.queued.push_back(Queued::Packet(packet));
     }
 
-    /// The oldest packet if more than `left` are queued, and what became of it.
+    /// Queues an event behind the packets that wait.
+    pub(super) fn queue_event(&mut self, event: gst::Event) {
+        self.queued.push_back(Queued::Event(event));
+    }
+
+    /// The next event before which no packet waits.
+    pub(super) fn next_event(&mut self) -> Option<gst::Event> {
+        match self.queued.pop_front()? {
+            Queued::Event(event) => Some(event),
+            packet => {
+                self.queued.push_front(packet);
+                None
+            }
+        }
+    }
+
+    /// The oldest packet if more than `left` are queued, and what became of it. Events before it are passed over.
     pub(super) fn receive(&mut self, left: usize) -> Option<(gst::Buffer, Decoded)> {
-        if self.queued.len() <= left {
+        let packets = self.queued.iter().filter(|queued| matches!(queued, Queued::Packet(_))).count();
+        if packets <= left {
             return None;
         }
-        let packet = self.queued.pop_front()?;
+        let packet = loop {
+            if let Queued::Packet(packet) = self.queued.pop_front()? {
+                break packet;
+            }
+        };
         let result = self.decoder.receive_packet()?;
         Some((packet, self.take(result)))
     }
@@ -185,6 +217,11 @@ impl Stream {
         let is_before = matches!((end, self.segment.start()), (Some(end), Some(start)) if end <= start);
         let in_store = asked.is_some_and(|asked| asked.elapsed() <= IN_STORE);
         if live || (first && !is_before) || !in_store { 0 } else { AHEAD }
+    }
+
+    /// Notes that upstream is to go on.
+    pub(super) fn done_with_input(&mut self) {
+        self.urgent.asked = Some(Instant::now());
     }
 
     /// What the decoder made of a packet.
