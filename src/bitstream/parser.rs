@@ -94,6 +94,9 @@ impl SlabParser {
         let (header, body) = parse_packet(packet, &self.limits)?;
         if header.keyframe {
             let (mut open, body) = OpenSlab::from_keyframe(&header, body, self.limits)?;
+            if let Some(mesh) = self.mesh() {
+                open.slab.reserve(mesh.counts());
+            }
             open.parse_payload(&header, body, &self.limits, self.bits.as_mut())?;
             self.state = State::Open(Box::new(open));
         } else if header.picture {

@@ -27,7 +27,7 @@ use super::range_coder::BitCoder;
 use super::stars::Stars;
 use super::vertices::{Linked, Vertices};
 use super::{Limits, MeshFault};
-use crate::mesh::{Domain, TetMesh, VertexId, volume6};
+use crate::mesh::{Domain, MeshCounts, TetMesh, VertexId, volume6};
 
 /// One side of the coding: the writer, who answers with the truth, or the parser, whose answers are ignored. Calls
 /// follow the syntax; each tet begins with `seed` or `behind`.
@@ -170,6 +170,17 @@ impl Slab {
             neighbours: Neighbours::default(),
             complete: Complete { duration: 1, ..Complete::default() },
         }
+    }
+
+    /// Makes room for a mesh like the one of the last slab, which this one is likely to be: lists that grow are copied again and again.
+    pub(super) fn reserve(&mut self, MeshCounts { vertices, wedges, tets }: MeshCounts) {
+        self.mesh.positions.reserve(vertices);
+        self.mesh.pinned.reserve(vertices);
+        self.mesh.wedges.reserve(wedges);
+        self.mesh.tets.reserve(tets);
+        self.known.reserve(wedges);
+        self.wedge_next.reserve(wedges);
+        self.vertices.reserve(vertices);
     }
 
     /// How coarse colours are.

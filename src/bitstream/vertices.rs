@@ -84,6 +84,11 @@ impl Vertices {
         });
     }
 
+    /// Makes room for so many more.
+    pub(super) fn reserve(&mut self, count: usize) {
+        self.0.reserve(count);
+    }
+
     /// The slab ends at `top`.
     pub(super) fn mark_top(&mut self, top: f32) {
         for vertex in self.0.iter_mut().filter(|vertex| vertex.position.z == top) {

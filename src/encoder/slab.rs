@@ -1,11 +1,14 @@
 //! One slab through the sliding window (§VI): lattice, cleave, simplify, commit, fit, write.
 
+mod goals;
 mod labels;
 mod refits;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+pub(super) use self::goals::ERROR_GAIN;
+use self::goals::RUN_RATIO;
 use super::observer::{Event, Observer, Stage};
 use super::proof::Proof;
 use super::quantize::{color_steps, rounded_rms};
@@ -20,23 +23,7 @@ use crate::vectorize::segment::Flatness;
 use crate::vectorize::simplify::{BlockGoal, Goal, SimplifyParams, Unfrozen, WedgeQuadric, WorkMesh, simplify};
 use crate::video::{Frame, LabelPlane, Volume};
 
-/// Vertices a pixel of one frame that the transition from the sparse window to its dense leading layer may have.
-const TRANSITION_RATIO: f64 = 0.1;
-
-/// Vertices that blocks of a run are simplified to, over those that the simplification ratio allows: the rest is left to
-/// the window, where they compete with all others. More where its first stage has more.
-const RUN_RATIO: f64 = 2.0;
-
-/// The same where labels differ: what blocks have frozen, planes dense with borders, lets less of them go cheaply.
-const CUT_RUN_RATIO: f64 = 4.0;
-
-/// How many times the vertices that a window is to have it may grow to before its blocks are simplified.
-const GROWTH: f64 = 1.5;
-
-/// The same where labels differ, and a window has twice the vertices: memory before time.
-const CUT_GROWTH: f64 = 1.2;
-
-/// The same for blocks of the window at the slab's end, pass by pass, each along other lines ([`BlockGoal::shift`]): the
+/// How many times the vertices that it is to have the window is simplified to in blocks at the slab's end, pass by pass, each along other lines ([`BlockGoal::shift`]): the
 /// last pass, over the whole, runs on one core, so little is left to it.
 const WINDOW_PASSES: [BlockPass; 2] = [BlockPass { shift: 0.5, ratio: 1.5 }, BlockPass { shift: 0.0, ratio: 1.1 }];
 
@@ -49,13 +36,6 @@ struct BlockPass {
 /// [`SimplifyParams::end_weights`] of a plane that is shown: half a frame makes up for the side that it does not have, the rest
 /// for tets that reach into it from one side alone (docs/benchmarks.md).
 const END_WEIGHT: f32 = 2.0;
-
-/// The part of the error allowed that blocks of a run may make, where the error decides.
-const RUN_ERROR: f32 = 0.25;
-
-/// Cost of the last collapse times vertices a pixel, over the squared mean absolute error that the fit then reaches:
-/// 140 to 180 on natural clips. Where it starts; each fit corrects it.
-pub(super) const ERROR_GAIN: f64 = 150.0;
 
 /// Most vertices that are fitted at once: more take more memory, and no less time.
 const FIT_VERTICES: usize = 50_000;
@@ -224,36 +204,6 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         Ok(packets)
     }
 
-    /// How far a run's blocks are simplified before they join the window.
-    fn goal_of_run(&self, run: &TetMesh, frames: u32) -> BlockGoal {
-        let pixels = self.pixels() * f64::from(frames);
-        if self.is_steered() {
-            return BlockGoal { keep: 0.0, max_error: RUN_ERROR * self.allowed_error(pixels), shift: 0.0 };
-        }
-        let keep = self.run_ratio() * self.ratio * pixels / run.positions.len() as f64;
-        BlockGoal { keep: keep.min(1.0), max_error: f32::INFINITY, shift: 0.0 }
-    }
-
-    /// Vertices that the window may have over those that the simplification ratio allows, before the slab ends.
-    fn run_ratio(&self) -> f64 {
-        if self.is_cut { self.run_ratio.max(CUT_RUN_RATIO) } else { self.run_ratio }
-    }
-
-    /// Whether the error decides, not the ratio.
-    fn is_steered(&self) -> bool {
-        self.target_error > 0.0
-    }
-
-    /// Pixels of a frame.
-    fn pixels(&self) -> f64 {
-        f64::from(self.committed.domain.width) * f64::from(self.committed.domain.height)
-    }
-
-    /// [`Goal::max_error`] that leads to the target error over so many pixels.
-    fn allowed_error(&self, pixels: f64) -> f32 {
-        (self.error_gain * self.target_error.powi(2) * pixels) as f32
-    }
-
     /// Simplifies and hands on; with `frames` the slab has ended and has that many.
     fn step(&mut self, frames: Option<u32>, observer: &mut Observer) -> Result<Vec<Packet>, EncodeError> {
         let is_whole = self.kept == u32::MAX;
@@ -263,8 +213,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let unfrozen = Unfrozen { low: self.frozen, high };
         if is_whole && frames.is_none() {
             // Nothing is handed on before the slab ends: only memory is at stake, and that roughly.
-            let growth = if self.is_cut { CUT_GROWTH } else { GROWTH };
-            if self.work.vertex_count() as f64 > growth * goal.vertices_in_window as f64 {
+            if self.work.vertex_count() as f64 > self.growth() * goal.vertices_in_window as f64 {
                 observer.tell(Event::Began(Stage::Simplify));
                 self.simplify_blocks(unfrozen, goal.vertices_in_window, 0.5, observer);
                 observer.tell(Event::Ended);
@@ -304,30 +253,6 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             let report = self.work.simplify_blocks(unfrozen, goal, &self.simplify_params);
             log::debug!("blocks of the window: {report:?}");
             observer.tell(Event::Simplified(report));
-        }
-    }
-
-    /// What the next commit will take must have reached the simplification ratio. Between it and the frozen leading
-    /// layer, next to which nothing becomes sparse, the same costs hold, and a bound for the window's memory.
-    fn goal(&self, frames: Option<u32>, lead: i32) -> Goal {
-        let unit = self.committed.domain.unit();
-        let pixels = self.pixels();
-        let handed_on = self.committed.positions.len() - self.work.committed_vertices().len();
-        let allowed = |frames: f64| ((self.ratio * frames * pixels).round() as usize).saturating_sub(handed_on);
-        let trailing = frames.unwrap_or((lead as u32).saturating_sub(self.kept));
-        let counted = f64::from(trailing) - f64::from(self.frozen.max(0)) / f64::from(unit);
-        let steered = self.is_steered();
-        Goal {
-            vertices: if steered { 0 } else { allowed(trailing.into()) },
-            before: if frames.is_some() { i32::MAX } else { trailing as i32 * unit },
-            vertices_in_window: match frames {
-                None if !steered => {
-                    (self.run_ratio() * allowed(lead.into()) as f64 + TRANSITION_RATIO * pixels) as usize
-                }
-                _ => usize::MAX,
-            },
-            max_cost: f32::MAX,
-            max_error: if steered { self.allowed_error(pixels * counted) } else { f32::INFINITY },
         }
     }
 
