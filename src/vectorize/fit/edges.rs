@@ -33,6 +33,23 @@ struct Side {
     share: Vec3,
 }
 
+impl Piece {
+    /// The points of the tet's corners, with their part in the share.
+    #[inline]
+    fn corners(&self, model: &Model) -> impl Iterator<Item = (usize, f32)> + use<> {
+        model.tet_points(self.tet as usize).into_iter().zip(self.share)
+    }
+}
+
+impl Side {
+    /// The points of the interface's corners, with their part in the share.
+    #[inline]
+    fn corners(&self, model: &Model) -> impl Iterator<Item = (usize, f32)> + use<> {
+        let points = model.interfaces[self.interface as usize].points.map(|point| point as usize);
+        points.into_iter().zip(self.share.to_array())
+    }
+}
+
 /// All edge pixels, in compressed rows.
 #[derive(Debug, Clone, Default)]
 pub(super) struct EdgePixels {
@@ -162,14 +179,14 @@ impl EdgePixels {
     #[inline]
     pub(super) fn change(&self, row: usize, (model, slopes): (&Model, &Slopes), displaced: &[Vec3]) -> Vec3 {
         let of_piece = |piece: &Piece| {
-            let corners = model.tet_points(piece.tet as usize).into_iter().zip(piece.share);
+            let corners = piece.corners(model);
             let way = corners.map(|(point, share)| displaced[point] * share).sum::<Vec3>();
             slopes.gradients[piece.tet as usize] * -way
         };
         // Going outward, the inner side gains what the outer one loses.
         let of_side = |(side, jump): (&Side, &Vec3)| {
-            let corners = model.interfaces[side.interface as usize].points.into_iter().zip(side.share.to_array());
-            let way = corners.map(|(point, share)| displaced[point as usize] * share).sum::<Vec3>();
+            let corners = side.corners(model);
+            let way = corners.map(|(point, share)| displaced[point] * share).sum::<Vec3>();
             *jump * slopes.normals[side.interface as usize].dot(way)
         };
         let pieces = self.pieces(row).iter().map(of_piece).sum::<Vec3>();
@@ -187,13 +204,13 @@ impl EdgePixels {
     ) {
         for piece in self.pieces(row) {
             let way = slopes.gradients[piece.tet as usize].transpose() * -change;
-            let corners = model.tet_points(piece.tet as usize).into_iter().zip(piece.share);
+            let corners = piece.corners(model);
             corners.for_each(|(point, share)| part(point, way * share));
         }
         for (side, jump) in self.sides(row).iter().zip(&slopes.jumps[self.side_range(row)]) {
             let way = slopes.normals[side.interface as usize] * jump.dot(change);
-            let corners = model.interfaces[side.interface as usize].points.into_iter().zip(side.share.to_array());
-            corners.for_each(|(point, share)| part(point as usize, way * share));
+            let corners = side.corners(model);
+            corners.for_each(|(point, share)| part(point, way * share));
         }
     }
 
@@ -207,14 +224,14 @@ impl EdgePixels {
     ) {
         for piece in self.pieces(row) {
             let gradient = slopes.gradients[piece.tet as usize];
-            let corners = model.tet_points(piece.tet as usize).into_iter().zip(piece.share);
+            let corners = piece.corners(model);
             corners.for_each(|(point, share)| part(point, gradient * -share));
         }
         for (side, &jump) in self.sides(row).iter().zip(&slopes.jumps[self.side_range(row)]) {
             let normal = slopes.normals[side.interface as usize];
             let outer = Mat3::from_cols(jump * normal.x, jump * normal.y, jump * normal.z);
-            let corners = model.interfaces[side.interface as usize].points.into_iter().zip(side.share.to_array());
-            corners.for_each(|(point, share)| part(point as usize, outer * share));
+            let corners = side.corners(model);
+            corners.for_each(|(point, share)| part(point, outer * share));
         }
     }
 }
