@@ -21,7 +21,7 @@ pub use self::config::{EncoderConfig, ErrorMetric, LatticeKind, SpeedPreset, Top
 use self::observer::Observer;
 pub use self::observer::{Event, Stage};
 use self::rate::{ErrorControl, RateControl};
-use self::slab::{SlabEncoder, SlabEnd, WindowEncoder};
+use self::slab::{ErrorModel, SlabEncoder, SlabEnd, WindowEncoder};
 use crate::bitstream::{IndexWriter, Packet, SequenceHeader, WriteError};
 use crate::vectorize::cleave::CleaveError;
 use crate::vectorize::fit::FitError;
@@ -93,7 +93,7 @@ pub struct Encoder {
     ready: VecDeque<Packet>,
     index: IndexWriter,
     vertices: u64,
-    error_gain: f64,
+    error_model: ErrorModel,
     observer: Observer,
     finished: bool,
     #[cfg(feature = "threads")]
@@ -122,7 +122,7 @@ impl Encoder {
             ready: VecDeque::new(),
             index: IndexWriter::new(),
             vertices: 0,
-            error_gain: slab::ERROR_GAIN,
+            error_model: ErrorModel::default(),
             observer: Observer::default(),
             finished: false,
             slab_config: config.clone(),
@@ -213,6 +213,7 @@ impl Encoder {
             }
             if let Some(error) = &self.error {
                 self.slab_config.target_error = error.target();
+                self.slab_config.simplification_ratio = error.simplification_ratio();
             }
         }
         let labels = self.observer.stage(Stage::Segment, || self.segmenter.push(&frame));
@@ -231,10 +232,10 @@ impl Encoder {
         let (config, header) = (&self.slab_config, self.slab_config.slab_header(is_cut));
         Ok(match config.error_metric {
             ErrorMetric::Color => {
-                Box::new(SlabEncoder::<ColorQuadric>::try_new(config, header, self.next_frame, self.error_gain)?)
+                Box::new(SlabEncoder::<ColorQuadric>::try_new(config, header, self.next_frame, self.error_model)?)
             }
             ErrorMetric::Paper => {
-                Box::new(SlabEncoder::<DistanceQuadric>::try_new(config, header, self.next_frame, self.error_gain)?)
+                Box::new(SlabEncoder::<DistanceQuadric>::try_new(config, header, self.next_frame, self.error_model)?)
             }
         })
     }
@@ -244,14 +245,14 @@ impl Encoder {
             let frames = slab.planes();
             let finished = slab.finish(end, &mut self.observer)?;
             self.vertices += finished.vertices;
-            self.error_gain = finished.error_gain;
+            self.error_model = finished.error_model;
             self.queue(finished.packets);
             let bytes = std::mem::take(&mut self.slab_bytes);
             if let Some(rate) = &mut self.rate {
                 rate.end_slab(frames, finished.vertices, bytes);
             }
             if let (Some(control), Some(error)) = (&mut self.error, finished.error) {
-                control.end_slab(frames, error);
+                control.end_slab(frames, finished.vertices, error);
             }
         }
         Ok(())

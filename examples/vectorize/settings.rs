@@ -39,7 +39,7 @@ pub(crate) struct Settings {
     /// Steps of the position optimisation.
     #[arg(long)]
     position_steps: Option<u32>,
-    /// Fits on the way to the simplification ratio.
+    /// Fits on the way to the goal.
     #[arg(long)]
     refits: Option<u32>,
     /// Use the paper's error metric.

@@ -91,8 +91,8 @@ pub struct EncoderConfig {
     pub topology: TopologyRule,
     /// Steps of the position optimisation, [`Self::POSITION_STEPS`]; 0: positions stay where edges collapsed to.
     pub position_steps: u32,
-    /// Fits on the way to the simplification ratio, [`Self::REFITS`]: each lets simplification start anew from a mesh that
-    /// is closer to the frames. Where the window is shorter than a slab, or `target_error` decides, there are none.
+    /// Fits on the way to the goal, [`Self::REFITS`]: each lets simplification start anew from a mesh that
+    /// is closer to the frames. Where the window is shorter than a slab, there are none.
     pub refits: u32,
     /// Worker threads; 0: all cores. Bytes do not depend on it.
     pub threads: usize,
@@ -247,16 +247,19 @@ impl EncoderConfig {
 
     /// Vertices a pixel that an adaptive lattice starts with.
     pub(super) fn lattice_ratio(&self) -> f64 {
-        let wanted = if self.target_error > 0.0 { STEERED_RATIO } else { self.simplification_ratio };
-        (wanted * self.lattice_density).min(1.0)
+        (self.simplification_ratio * self.lattice_density).min(1.0)
     }
 
     /// Frames whose mesh decoders accept, with room for the plane that joins the next slab.
     fn frames_within_limits(&self) -> u32 {
-        let limits = Limits::default();
-        let vertices = f64::from(limits.max_vertices).min(f64::from(limits.max_tets) / TETS_A_VERTEX);
         let a_frame = self.simplification_ratio * f64::from(self.width) * f64::from(self.height);
-        (vertices / a_frame - 1.0) as u32
+        (self.most_vertices() / a_frame - 1.0) as u32
+    }
+
+    /// Vertices of a slab that decoders accept.
+    pub(super) fn most_vertices(&self) -> f64 {
+        let limits = Limits::default();
+        f64::from(limits.max_vertices).min(f64::from(limits.max_tets) / TETS_A_VERTEX)
     }
 
     /// The sequence header of streams made with these settings; slabs that begin with labels have finer positions.
@@ -280,8 +283,6 @@ impl EncoderConfig {
 
 /// Tets a vertex of a simplified mesh, with a margin: 5 to 6.5 on natural clips.
 const TETS_A_VERTEX: f64 = 7.0;
-/// Vertices a pixel that may be needed where the error decides: more than streams are made of that anyone watches.
-const STEERED_RATIO: f64 = 0.02;
 /// Positions are rounded to 1/8 px and 1/8 frame: costs 0.1 dB (docs/benchmarks.md).
 const SUBPIXEL_BITS: u8 = 3;
 /// The same in slabs that begin with labels, where places are what is to be seen: of drawings in motion one digit more is worth

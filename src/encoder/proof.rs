@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use super::{EncodeError, EncoderConfig};
+use super::EncodeError;
 use crate::mesh::TetMesh;
 use crate::metrics::Difference;
 use crate::render::{DrawParams, Scene};
@@ -23,8 +23,8 @@ pub(super) struct Proof {
 }
 
 impl Proof {
-    pub(super) fn new(config: &EncoderConfig) -> Self {
-        let params = DrawParams { levels: config.subdivision_levels, antialias: true, viewport: None, mesh: false };
+    pub(super) fn new(subdivision_levels: u8) -> Self {
+        let params = DrawParams { levels: subdivision_levels, antialias: true, viewport: None, mesh: false };
         Self { params, scene: None, total: Difference::default() }
     }
 

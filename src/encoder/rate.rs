@@ -53,10 +53,7 @@ impl RateControl {
     pub(super) fn simplification_ratio(&self) -> f64 {
         let share = 1.0 + self.saved / self.horizon / self.bytes_a_frame;
         let bytes = self.bytes_a_frame * share.clamp(*SHARE.start(), *SHARE.end());
-        let range = EncoderConfig::SIMPLIFICATION_RATIO;
-        // A slab of a few frames must still fit.
-        let most = range.end().min(f64::from(Limits::default().max_vertices) / 8.0 / self.pixels);
-        (bytes / self.bytes_a_vertex / self.pixels).clamp(*range.start(), most.max(*range.start()))
+        ratio_within_limits(bytes / self.bytes_a_vertex / self.pixels, self.pixels)
     }
 
     /// A slab of so many frames has so many vertices and took so many bytes.
@@ -68,6 +65,19 @@ impl RateControl {
     }
 }
 
+/// The simplification ratio nearest to `wanted` that settings may have, and a slab of a few frames of so many pixels.
+fn ratio_within_limits(wanted: f64, pixels: f64) -> f64 {
+    let range = EncoderConfig::SIMPLIFICATION_RATIO;
+    let most = range.end().min(f64::from(Limits::default().max_vertices) / 8.0 / pixels);
+    wanted.clamp(*range.start(), most.max(*range.start()))
+}
+
+/// Vertices a pixel that the first slab may need where the error decides: more than streams are made of that anyone watches.
+const FIRST_RATIO: f64 = 0.02;
+
+/// Vertices that a slab may need over those that the last one had.
+const HEADROOM: f64 = 1.3;
+
 /// A slab's target, at least and at most, over the stream's, whatever the slabs before it reached.
 const AIM: std::ops::RangeInclusive<f64> = 0.75..=1.25;
 
@@ -75,17 +85,21 @@ const AIM: std::ops::RangeInclusive<f64> = 0.75..=1.25;
 #[derive(Debug, Clone)]
 pub(super) struct ErrorControl {
     target: f64,
+    pixels: f64,
     /// Frames over which a difference is made good.
     horizon: f64,
     /// Sum over all frames so far of what the error was below the target.
     saved: f64,
+    ratio: f64,
 }
 
 impl ErrorControl {
     /// Control for the target error of `config`; `None` if it has none.
     pub(super) fn new(config: &EncoderConfig) -> Option<Self> {
         let EncoderConfig { target_error: target, key_int_max, .. } = *config;
-        (target > 0.0).then(|| Self { target, horizon: key_int_max.into(), saved: 0.0 })
+        let pixels = f64::from(config.width) * f64::from(config.height);
+        let ratio = ratio_within_limits(FIRST_RATIO, pixels);
+        (target > 0.0).then(|| Self { target, pixels, horizon: key_int_max.into(), saved: 0.0, ratio })
     }
 
     /// The target error of the next slab.
@@ -94,9 +108,17 @@ impl ErrorControl {
         self.target * aim.clamp(*AIM.start(), *AIM.end())
     }
 
-    /// A slab of so many frames has this mean absolute error.
-    pub(super) fn end_slab(&mut self, frames: u32, error: f64) {
+    /// The simplification ratio that the next slab may need: it says how long the slab is, as decoders accept so many vertices, and
+    /// how many it starts with.
+    pub(super) fn simplification_ratio(&self) -> f64 {
+        self.ratio
+    }
+
+    /// A slab of so many frames has so many vertices and this mean absolute error.
+    pub(super) fn end_slab(&mut self, frames: u32, vertices: u64, error: f64) {
         self.saved += (self.target - error) * f64::from(frames);
+        let ratio = vertices as f64 / (f64::from(frames.max(1)) * self.pixels);
+        self.ratio = ratio_within_limits(HEADROOM * ratio, self.pixels);
     }
 }
 
@@ -136,12 +158,26 @@ mod tests {
         let config = EncoderConfig { target_error: 2.0, ..EncoderConfig::new(640, 360) };
         let mut control = ErrorControl::new(&config).expect("a target");
         assert_eq!(control.target(), 2.0);
-        control.end_slab(60, 2.3);
+        control.end_slab(60, 1000, 2.3);
         assert!((control.target() - 1.7).abs() < 1e-9);
-        control.end_slab(60, 1.7);
+        control.end_slab(60, 1000, 1.7);
         assert!((control.target() - 2.0).abs() < 1e-9);
-        control.end_slab(60, 9.0);
+        control.end_slab(60, 1000, 9.0);
         assert_eq!(control.target(), 1.5);
+    }
+
+    #[test]
+    fn slabs_of_many_vertices_are_short() {
+        let config = EncoderConfig { target_error: 1.0, ..EncoderConfig::new(3840, 2160) };
+        let mut control = ErrorControl::new(&config).expect("a target");
+        let mut frames = |vertices| {
+            control.end_slab(10, vertices, 1.0);
+            let simplification_ratio = control.simplification_ratio();
+            EncoderConfig { simplification_ratio, ..config.clone() }.slab_frames()
+        };
+        assert_eq!(frames(10_000), 60);
+        assert_eq!(frames(1_000_000), 8);
+        assert!(frames(10_000_000) >= 1, "one frame is a slab");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! One slab through the sliding window (§VI): lattice, cleave, simplify, commit, fit, write.
 
+mod aim;
 mod goals;
 mod labels;
 mod refits;
@@ -7,7 +8,8 @@ mod refits;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-pub(super) use self::goals::ERROR_GAIN;
+use self::aim::Aim;
+pub(super) use self::aim::ErrorModel;
 use self::goals::RUN_RATIO;
 use super::observer::{Event, Observer, Stage};
 use super::proof::Proof;
@@ -55,8 +57,8 @@ pub(super) struct FinishedSlab {
     pub(super) packets: Vec<Packet>,
     /// Vertices of the slab's mesh.
     pub(super) vertices: u64,
-    /// What was learnt about [`ERROR_GAIN`].
-    pub(super) error_gain: f64,
+    /// What was learnt about the way to an error.
+    pub(super) error_model: ErrorModel,
     /// Mean absolute error, where the error decides.
     pub(super) error: Option<f64>,
 }
@@ -88,15 +90,17 @@ pub(super) fn latency_frames(config: &EncoderConfig) -> u32 {
 pub(super) struct SlabEncoder<Q> {
     ratio: f64,
     target_error: f64,
-    error_gain: f64,
+    aim: Aim,
+    /// Most vertices that decoders accept.
+    most_vertices: f64,
     proof: Proof,
     /// Frames behind the window's leading plane that are kept after a step.
     kept: u32,
     /// Packets that are fitted and written together, to look at each frame less often.
     batch: u32,
-    /// Whether the window holds the slab as a whole and there is a number of vertices to come to.
+    /// Whether the window holds the slab as a whole and there is, or will be, a number of vertices to come to.
     has_stages: bool,
-    /// Fits on the way to the simplification ratio, where there are stages.
+    /// Fits on the way to the goal, where there are stages.
     refits: u32,
     /// [`RUN_RATIO`], or what the first of these fits needs.
     run_ratio: f64,
@@ -130,7 +134,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         config: &EncoderConfig,
         header: SequenceHeader,
         first_frame: u64,
-        error_gain: f64,
+        error_model: ErrorModel,
     ) -> Result<Self, EncodeError> {
         let domain = Domain {
             width: config.width,
@@ -140,13 +144,14 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             subpixel_bits: header.subpixel_bits,
         };
         let is_whole = config.kept_frames() == u32::MAX;
-        let has_stages = is_whole && config.target_error <= 0.0;
+        let has_stages = is_whole && (config.target_error <= 0.0 || config.refits > 0);
         let refits = if has_stages { config.refits } else { 0 };
         Ok(Self {
             ratio: config.simplification_ratio,
             target_error: config.target_error,
-            error_gain,
-            proof: Proof::new(config),
+            aim: Aim::new(config.target_error, refits, error_model),
+            most_vertices: config.most_vertices(),
+            proof: Proof::new(config.subdivision_levels),
             kept: config.kept_frames(),
             batch: config.window,
             has_stages,
@@ -215,12 +220,12 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             // Nothing is handed on before the slab ends: only memory is at stake, and that roughly.
             if self.work.vertex_count() as f64 > self.growth() * goal.vertices_in_window as f64 {
                 observer.tell(Event::Began(Stage::Simplify));
-                self.simplify_blocks(unfrozen, goal.vertices_in_window, 0.5, observer);
+                self.simplify_blocks(unfrozen, self.keep_of_window(goal.vertices_in_window, 0.5), observer);
                 observer.tell(Event::Ended);
             }
             return Ok(Vec::new());
         }
-        self.refit(unfrozen, goal.vertices, observer)?;
+        let goal = self.refit(unfrozen, goal, observer)?;
         observer.tell(Event::Began(Stage::Simplify));
         self.simplify_to(unfrozen, goal, observer);
         observer.tell(Event::Ended);
@@ -237,7 +242,8 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     fn simplify_to(&mut self, unfrozen: Unfrozen, goal: Goal, observer: &mut Observer) {
         if self.has_stages {
             for pass in &WINDOW_PASSES {
-                self.simplify_blocks(unfrozen, (pass.ratio * goal.vertices as f64) as usize, pass.shift, observer);
+                let goal = self.keep_of_window((pass.ratio * goal.vertices as f64) as usize, pass.shift);
+                self.simplify_blocks(unfrozen, goal, observer);
             }
         }
         let report = simplify(&mut self.work, unfrozen, goal, &self.simplify_params);
@@ -245,11 +251,14 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         observer.tell(Event::Simplified(report));
     }
 
-    /// Simplifies the window in blocks to about so many vertices.
-    fn simplify_blocks(&mut self, unfrozen: Unfrozen, vertices: usize, shift: f64, observer: &mut Observer) {
-        let keep = vertices as f64 / self.work.vertex_count() as f64;
-        if keep < 1.0 {
-            let goal = BlockGoal { keep, max_error: f32::INFINITY, shift };
+    /// About so many of the window's vertices.
+    fn keep_of_window(&self, vertices: usize, shift: f64) -> BlockGoal {
+        BlockGoal { keep: vertices as f64 / self.work.vertex_count() as f64, max_error: f32::INFINITY, shift }
+    }
+
+    /// Simplifies the window in blocks.
+    fn simplify_blocks(&mut self, unfrozen: Unfrozen, goal: BlockGoal, observer: &mut Observer) {
+        if goal.keep < 1.0 {
             let report = self.work.simplify_blocks(unfrozen, goal, &self.simplify_params);
             log::debug!("blocks of the window: {report:?}");
             observer.tell(Event::Simplified(report));
@@ -314,7 +323,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let written = self.sent..end;
         let frames = self.volume.frames().filter(|(number, _)| written.contains(number));
         if let Some(reached) = self.proof.compare(mesh, frames)?.filter(|&reached| reached > 0.0) {
-            self.error_gain *= (self.target_error / reached).powi(2).clamp(0.5, 2.0);
+            self.aim.arrive(mesh.positions.len(), reached);
         }
         Ok(())
     }
@@ -375,7 +384,7 @@ impl<Q: WedgeQuadric> WindowEncoder for SlabEncoder<Q> {
         self.committed.domain.duration = duration;
         let packets = self.advance(Some(frames), observer)?;
         let vertices = self.committed.positions.len() as u64;
-        Ok(FinishedSlab { packets, vertices, error_gain: self.error_gain, error: self.proof.error() })
+        Ok(FinishedSlab { packets, vertices, error_model: self.aim.model(), error: self.proof.error() })
     }
 }
 

@@ -6,7 +6,7 @@ mod clips;
 mod damage;
 
 use clips::{bars, config, decode, disc, encode, picture, psnr, waves};
-use tetvec::metrics::simplification_ratio;
+use tetvec::metrics::{Difference, simplification_ratio};
 use tetvec::{
     DecodeError, Decoder, DecoderConfig, EncodeError, Encoder, EncoderConfig, ErrorMetric, Event, Frame, Stage, Surface,
 };
@@ -320,4 +320,25 @@ fn the_bit_rate_is_kept_over_ten_seconds() {
         let off = reached / f64::from(kilobits) - 1.0;
         assert!(off.abs() <= 0.05, "{kilobits} kbit/s asked for, {reached:.1} reached");
     }
+}
+
+/// The error is kept slab by slab by one fit, and by several, which need fewer vertices for it.
+#[test]
+fn the_error_is_kept_and_refits_have_it_for_less() {
+    const TARGET: f64 = 2.5;
+    let size = (64, 48);
+    let frames = waves(size, 64);
+    let with = |refits: u32| {
+        let goal = EncoderConfig { target_error: TARGET, key_int_max: 16, window: 16, superpixels: 1, ..config(size) };
+        let stream = encode(&frames, EncoderConfig { refits, ..goal }, &[]);
+        let mut difference = Difference::default();
+        for (frame, shown) in frames.iter().zip(decode(&stream.packets, size, DecoderConfig::default())) {
+            difference.add(frame, &shown);
+        }
+        let reached = difference.reconstruction_error();
+        assert!((reached / TARGET - 1.0).abs() <= 0.05, "{refits} refits: {reached:.2} for {TARGET}");
+        stream.vertices
+    };
+    let (without, refitted) = (with(0), with(2));
+    assert!((refitted as f64) < 0.9 * without as f64, "{refitted} for {without} vertices");
 }

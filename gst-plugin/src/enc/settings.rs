@@ -159,7 +159,7 @@ impl Settings {
                 (
                     "refits",
                     "Refits",
-                    "Fits on the way to the simplification ratio, from which simplification starts anew",
+                    "Fits on the way to the goal, from which simplification starts anew",
                 ),
                 EncoderConfig::REFITS,
                 default.refits,

@@ -24,18 +24,18 @@ const GROWTH: f64 = 1.5;
 const CUT_GROWTH: f64 = 1.2;
 
 /// The part of the error allowed that blocks of a run may make, where the error decides.
-const RUN_ERROR: f32 = 0.25;
+const RUN_ERROR: f64 = 0.25;
 
-/// Cost of the last collapse times vertices a pixel, over the squared mean absolute error that the fit then reaches:
-/// 140 to 180 on natural clips. Where it starts; each fit corrects it.
-pub(in crate::encoder) const ERROR_GAIN: f64 = 150.0;
+/// The same over what the first stage of a window may make that holds the slab.
+const RUN_ERROR_OF_STAGE: f64 = 0.7;
 
 impl<Q: WedgeQuadric> SlabEncoder<Q> {
     /// How far a run's blocks are simplified before they join the window.
     pub(super) fn goal_of_run(&self, run: &TetMesh, frames: u32) -> BlockGoal {
         let pixels = self.pixels() * f64::from(frames);
         if self.is_steered() {
-            return BlockGoal { keep: 0.0, max_error: RUN_ERROR * self.allowed_error(pixels), shift: 0.0 };
+            let part = if self.has_stages { RUN_ERROR_OF_STAGE * self.aim.first_part() } else { RUN_ERROR };
+            return BlockGoal { keep: 0.0, max_error: (part * self.allowed_error(pixels)) as f32, shift: 0.0 };
         }
         let keep = self.run_ratio() * self.ratio * pixels / run.positions.len() as f64;
         BlockGoal { keep: keep.min(1.0), max_error: f32::INFINITY, shift: 0.0 }
@@ -57,8 +57,8 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     }
 
     /// [`Goal::max_error`] that leads to the target error over so many pixels.
-    pub(super) fn allowed_error(&self, pixels: f64) -> f32 {
-        (self.error_gain * self.target_error.powi(2) * pixels) as f32
+    pub(super) fn allowed_error(&self, pixels: f64) -> f64 {
+        self.aim.allowed() * pixels
     }
 
     /// How many times the vertices that the window is to have it may grow to before its blocks are simplified.
@@ -86,7 +86,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
                 _ => usize::MAX,
             },
             max_cost: f32::MAX,
-            max_error: if steered { self.allowed_error(pixels * counted) } else { f32::INFINITY },
+            max_error: if steered { self.allowed_error(pixels * counted) as f32 } else { f32::INFINITY },
         }
     }
 }

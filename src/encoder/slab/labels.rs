@@ -22,7 +22,8 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     pub(super) fn follow_labels(&mut self, frame: &Frame, labels: &LabelPlane) {
         let is_first_cut = !self.is_cut && !labels.is_uniform();
         self.is_cut |= is_first_cut;
-        if !is_first_cut && !(self.is_cut && self.planes.is_multiple_of(FLATNESS_EVERY)) {
+        let is_due = self.is_cut && self.planes.is_multiple_of(FLATNESS_EVERY);
+        if !(is_first_cut || is_due) {
             return;
         }
         self.flatness.look(frame, labels);
