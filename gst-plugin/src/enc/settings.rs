@@ -156,11 +156,7 @@ impl Settings {
                 default.position_steps,
             ),
             uint(
-                (
-                    "refits",
-                    "Refits",
-                    "Fits on the way to the goal, from which simplification starts anew",
-                ),
+                ("refits", "Refits", "Fits on the way to the goal, from which simplification starts anew"),
                 EncoderConfig::REFITS,
                 default.refits,
             ),
