@@ -247,7 +247,9 @@ impl EncoderConfig {
 
     /// Vertices a pixel that an adaptive lattice starts with.
     pub(super) fn lattice_ratio(&self) -> f64 {
-        (self.simplification_ratio * self.lattice_density).min(1.0)
+        // What a slab before needed says nothing of the next scene.
+        let least = if self.target_error > 0.0 { LEAST_STEERED_RATIO } else { 0.0 };
+        (self.simplification_ratio.max(least) * self.lattice_density).min(1.0)
     }
 
     /// Frames whose mesh decoders accept, with room for the plane that joins the next slab.
@@ -283,6 +285,8 @@ impl EncoderConfig {
 
 /// Tets a vertex of a simplified mesh, with a margin: 5 to 6.5 on natural clips.
 const TETS_A_VERTEX: f64 = 7.0;
+/// Vertices a pixel that a slab may come to need in any case where the error decides.
+const LEAST_STEERED_RATIO: f64 = 0.01;
 /// Positions are rounded to 1/8 px and 1/8 frame: costs 0.1 dB (docs/benchmarks.md).
 const SUBPIXEL_BITS: u8 = 3;
 /// The same in slabs that begin with labels, where places are what is to be seen: of drawings in motion one digit more is worth
@@ -312,6 +316,14 @@ mod tests {
             assert_eq!((set.simplification_ratio, set.key_int_max, set.threads), (0.05, 30, 1));
             assert_eq!(set.with_preset(SpeedPreset::Medium), mine, "each sets all that another does");
         }
+    }
+
+    #[test]
+    fn slabs_start_dense_where_the_error_decides() {
+        let sparse = EncoderConfig { simplification_ratio: 0.0005, ..EncoderConfig::new(64, 48) };
+        assert!((sparse.lattice_ratio() - 0.006).abs() < 1e-9);
+        let after_black = EncoderConfig { target_error: 1.0, ..sparse };
+        assert!(after_black.lattice_ratio() > 0.1, "the next scene needs more than black did");
     }
 
     #[test]

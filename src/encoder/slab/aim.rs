@@ -2,8 +2,8 @@
 //!
 //! In: vertices and errors of meshes on the way there. Out: how many are to be left. Forbidden here: meshes, pictures.
 //!
-//! The error of a fitted mesh is near to a power of its number of vertices: -0.3 to -0.5 from clip to clip, which the meshes on
-//! the way tell (docs/benchmarks.md).
+//! The error of a fitted mesh is near to a power of its number of vertices: -0.3 to -0.5 from clip to clip. Each mesh on the way
+//! is closer to the goal than the one before, so what the power is matters less and less (docs/benchmarks.md).
 
 use super::refits::FIRST_STAGE;
 
