@@ -327,7 +327,7 @@ fn the_bit_rate_is_kept_over_ten_seconds() {
 fn the_error_is_kept_and_refits_have_it_for_less() {
     const TARGET: f64 = 2.5;
     let size = (64, 48);
-    let frames = waves(size, 64);
+    let frames = waves(size, 48);
     let with = |refits: u32| {
         let goal = EncoderConfig { target_error: TARGET, key_int_max: 16, window: 16, superpixels: 1, ..config(size) };
         let stream = encode(&frames, EncoderConfig { refits, ..goal }, &[]);
