@@ -254,8 +254,13 @@ impl EncoderConfig {
 
     /// Frames whose mesh decoders accept, with room for the plane that joins the next slab.
     fn frames_within_limits(&self) -> u32 {
-        let a_frame = self.simplification_ratio * f64::from(self.width) * f64::from(self.height);
+        let a_frame = self.simplification_ratio * self.pixels();
         (self.most_vertices() / a_frame - 1.0) as u32
+    }
+
+    /// Pixels of a frame.
+    pub(super) fn pixels(&self) -> f64 {
+        f64::from(self.width) * f64::from(self.height)
     }
 
     /// Vertices of a slab that decoders accept.

@@ -42,7 +42,7 @@ impl RateControl {
         let rate = if rate > 0.0 { rate } else { FALLBACK_RATE };
         Some(Self {
             bytes_a_frame: f64::from(config.bitrate) * 1000.0 / 8.0 / rate,
-            pixels: f64::from(config.width) * f64::from(config.height),
+            pixels: config.pixels(),
             horizon: f64::from(config.key_int_max),
             bytes_a_vertex: FIRST_BYTES_A_VERTEX[config.superpixels.min(2) as usize],
             saved: 0.0,
@@ -90,6 +90,7 @@ pub(super) struct ErrorControl {
     horizon: f64,
     /// Sum over all frames so far of what the error was below the target.
     saved: f64,
+    /// Vertices a pixel that the next slab may need.
     ratio: f64,
 }
 
@@ -97,7 +98,7 @@ impl ErrorControl {
     /// Control for the target error of `config`; `None` if it has none.
     pub(super) fn new(config: &EncoderConfig) -> Option<Self> {
         let EncoderConfig { target_error: target, key_int_max, .. } = *config;
-        let pixels = f64::from(config.width) * f64::from(config.height);
+        let pixels = config.pixels();
         let ratio = ratio_within_limits(FIRST_RATIO, pixels);
         (target > 0.0).then(|| Self { target, pixels, horizon: key_int_max.into(), saved: 0.0, ratio })
     }

@@ -25,8 +25,8 @@ use crate::vectorize::segment::Flatness;
 use crate::vectorize::simplify::{BlockGoal, Goal, SimplifyParams, Unfrozen, WedgeQuadric, WorkMesh, simplify};
 use crate::video::{Frame, LabelPlane, Volume};
 
-/// How many times the vertices that it is to have the window is simplified to in blocks at the slab's end, pass by pass, each along other lines ([`BlockGoal::shift`]): the
-/// last pass, over the whole, runs on one core, so little is left to it.
+/// How many times the vertices that it is to have the window is simplified to in blocks at the slab's end, pass by pass, each
+/// along other lines ([`BlockGoal::shift`]): the last pass, over the whole, runs on one core, so little is left to it.
 const WINDOW_PASSES: [BlockPass; 2] = [BlockPass { shift: 0.5, ratio: 1.5 }, BlockPass { shift: 0.0, ratio: 1.1 }];
 
 /// A pass over the window in blocks.
@@ -89,7 +89,6 @@ pub(super) fn latency_frames(config: &EncoderConfig) -> u32 {
 /// Vectorises one slab.
 pub(super) struct SlabEncoder<Q> {
     ratio: f64,
-    target_error: f64,
     aim: Aim,
     /// Most vertices that decoders accept.
     most_vertices: f64,
@@ -148,7 +147,6 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let refits = if has_stages { config.refits } else { 0 };
         Ok(Self {
             ratio: config.simplification_ratio,
-            target_error: config.target_error,
             aim: Aim::new(config.target_error, refits, error_model),
             most_vertices: config.most_vertices(),
             proof: Proof::new(config.subdivision_levels),
@@ -322,7 +320,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
         let Some(mesh) = self.writer.coded_mesh() else { return Ok(()) };
         let written = self.sent..end;
         let frames = self.volume.frames().filter(|(number, _)| written.contains(number));
-        if let Some(reached) = self.proof.compare(mesh, frames)?.filter(|&reached| reached > 0.0) {
+        if let Some(reached) = self.proof.compare(mesh, frames)? {
             self.aim.arrive(mesh.positions.len(), reached);
         }
         Ok(())

@@ -120,10 +120,15 @@ pub(crate) fn decode(packets: &[Packet], size: (u32, u32), config: DecoderConfig
     frames
 }
 
-/// PSNR over all frames, in dB.
-pub(crate) fn psnr(reference: &[Frame], test: &[Frame]) -> f64 {
+/// The difference over all frames.
+pub(crate) fn difference(reference: &[Frame], test: &[Frame]) -> Difference {
     assert_eq!(reference.len(), test.len(), "as many pictures as went in");
     let mut difference = Difference::default();
     reference.iter().zip(test).for_each(|(a, b)| difference.add(a, b));
-    difference.psnr()
+    difference
+}
+
+/// PSNR over all frames, in dB.
+pub(crate) fn psnr(reference: &[Frame], test: &[Frame]) -> f64 {
+    difference(reference, test).psnr()
 }

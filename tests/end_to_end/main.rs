@@ -5,8 +5,8 @@
 mod clips;
 mod damage;
 
-use clips::{bars, config, decode, disc, encode, picture, psnr, waves};
-use tetvec::metrics::{Difference, simplification_ratio};
+use clips::{bars, config, decode, difference, disc, encode, picture, psnr, waves};
+use tetvec::metrics::simplification_ratio;
 use tetvec::{
     DecodeError, Decoder, DecoderConfig, EncodeError, Encoder, EncoderConfig, ErrorMetric, Event, Frame, Stage, Surface,
 };
@@ -331,11 +331,8 @@ fn the_error_is_kept_and_refits_have_it_for_less() {
     let with = |refits: u32| {
         let goal = EncoderConfig { target_error: TARGET, key_int_max: 16, window: 16, superpixels: 1, ..config(size) };
         let stream = encode(&frames, EncoderConfig { refits, ..goal }, &[]);
-        let mut difference = Difference::default();
-        for (frame, shown) in frames.iter().zip(decode(&stream.packets, size, DecoderConfig::default())) {
-            difference.add(frame, &shown);
-        }
-        let reached = difference.reconstruction_error();
+        let shown = decode(&stream.packets, size, DecoderConfig::default());
+        let reached = difference(&frames, &shown).reconstruction_error();
         assert!((reached / TARGET - 1.0).abs() <= 0.05, "{refits} refits: {reached:.2} for {TARGET}");
         stream.vertices
     };

@@ -56,6 +56,11 @@ impl Aim {
         Self { target, model, stages, last: None }
     }
 
+    /// Whether there is a target, so that the error decides.
+    pub(super) fn is_wanted(&self) -> bool {
+        self.target > 0.0
+    }
+
     /// Cost of the last collapse times vertices a pixel that is foretold to lead to the target by one fit.
     pub(super) fn allowed(&self) -> f64 {
         self.model.gain * self.target.powi(2)
@@ -90,7 +95,8 @@ impl Aim {
     pub(super) fn arrive(&mut self, vertices: usize, error: f64) {
         match self.last {
             None => self.model.correct_gain(self.target, error),
-            Some(last) if last.error > 0.0 && vertices > 0 => {
+            // Pictures without an error teach nothing.
+            Some(last) if last.error > 0.0 && error > 0.0 && vertices > 0 => {
                 let foretold = last.error * (last.vertices / vertices as f64).powf(EXPONENT);
                 self.model.fit = (error / foretold).clamp(*FIT.start(), *FIT.end());
             }
@@ -117,7 +123,7 @@ impl ErrorModel {
 mod tests {
     use super::*;
 
-    /// The error of a clip that the model is wrong about: another power, another surplus at the end.
+    /// The error of a clip that the model is wrong about: another power, and fits that take nothing away.
     fn error(vertices: f64) -> f64 {
         2.0 * (vertices / 10_000.0).powf(-0.5)
     }

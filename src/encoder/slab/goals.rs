@@ -48,7 +48,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
 
     /// Whether the error decides, not the ratio.
     pub(super) fn is_steered(&self) -> bool {
-        self.target_error > 0.0
+        self.aim.is_wanted()
     }
 
     /// Pixels of a frame.

@@ -62,7 +62,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             observer.tell(Event::Began(Stage::Simplify));
             match fitted.take() {
                 Some(mesh) => self.start_again(&mesh, ratio * goal.vertices as f64, observer),
-                None => self.simplify_blocks(unfrozen, self.first_stage(ratio, goal), observer),
+                None => self.simplify_blocks(unfrozen, self.goal_of_first(ratio, goal), observer),
             }
             let mut mesh = TetMesh::empty(self.committed.domain);
             self.work.commit(i32::MAX, &mut mesh);
@@ -89,7 +89,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
     }
 
     /// How far the window is simplified before its first fit.
-    fn first_stage(&self, ratio: f64, goal: Goal) -> BlockGoal {
+    fn goal_of_first(&self, ratio: f64, goal: Goal) -> BlockGoal {
         if self.is_steered() {
             let max_error = self.aim.first_part() as f32 * goal.max_error;
             return BlockGoal { keep: 0.0, max_error, shift: 0.0 };
