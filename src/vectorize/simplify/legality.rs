@@ -174,14 +174,28 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         }
         // All tets around a vertex of one label have that label, the edge's too.
         let is_inside = self.wedges(lower).count() == 1;
-        let is_along = || self.wedges(lower).all(|wedge| self.is_around(u, v, wedge.label));
-        if is_inside || is_along() { Ok(()) } else { Err(Refusal::Labels) }
+        if is_inside || self.is_along(u, v, lower) { Ok(()) } else { Err(Refusal::Labels) }
     }
 
-    /// Whether one of the tets around an edge has this label.
-    fn is_around(&self, u: u32, v: u32, label: Label) -> bool {
-        let mut shared = self.stars.star(u).iter().filter(|&&t| self.tets[t as usize].contains(&v));
-        shared.any(|&t| self.labels[t as usize] == label)
+    /// Whether the tets around an edge have all labels of `end`, one of its ends. None of them has another one.
+    fn is_along(&self, u: u32, v: u32, end: u32) -> bool {
+        let (near, far) = if self.stars.star(u).len() <= self.stars.star(v).len() { (u, v) } else { (v, u) };
+        let count = self.wedges(end).count() as u32;
+        let (mut found, mut last) = (0u64, None);
+        for &tet in self.stars.star(near) {
+            let label = self.labels[tet as usize];
+            if last == Some(label) || !self.tets[tet as usize].contains(&far) {
+                continue;
+            }
+            last = Some(label);
+            // Of more labels than there are bits, which no picture has at a point, not all are found.
+            let wedge = self.wedges(end).take(u64::BITS as usize).position(|wedge| wedge.label == label);
+            found |= wedge.map_or(0, |n| 1 << n);
+            if found.count_ones() == count {
+                return true;
+            }
+        }
+        false
     }
 
     /// The link condition on the surfaces between labels: a vertex that they join to both ends must share a face of them

@@ -76,11 +76,8 @@ impl<Q: WedgeQuadric> Swapper<'_, Q> {
 
     /// Removes an edge if other tets in its place are better than `tet`, the worst there.
     fn remove_edge(&mut self, tet: u32, [u, v]: [u32; 2]) -> bool {
-        if !self.find_ring(u, v) {
-            return false;
-        }
         let before = self.qualities[tet as usize];
-        if self.old.iter().any(|&other| self.qualities[other as usize] < before) {
+        if !self.gather(u, v, before) || !self.find_ring(u, v) {
             return false;
         }
         if self.change_of_colors(self.ring.iter().copied().chain([u, v])) > self.price {
@@ -101,17 +98,30 @@ impl<Q: WedgeQuadric> Swapper<'_, Q> {
         true
     }
 
-    /// Finds the tets and the vertices around an edge, if they are few, of one label, and go all around.
-    fn find_ring(&mut self, u: u32, v: u32) -> bool {
-        let Self { mesh, old, ring, .. } = self;
+    /// Finds the tets around an edge, if they are few, of one label, and none of them is worse than `worst`. Most edges are given
+    /// up at the first that is.
+    fn gather(&mut self, u: u32, v: u32, worst: f32) -> bool {
+        let Self { mesh, old, qualities, .. } = self;
         old.clear();
         let (near, far) = if mesh.stars.star(u).len() <= mesh.stars.star(v).len() { (u, v) } else { (v, u) };
-        old.extend(mesh.stars.star(near).iter().copied().filter(|&tet| mesh.tets[tet as usize].contains(&far)));
-        let count = old.len();
-        let is_alike = old.iter().all(|&tet| mesh.labels[tet as usize] == mesh.labels[old[0] as usize]);
-        if !(3..=MOST_RING).contains(&count) || !is_alike {
-            return false;
+        for &tet in mesh.stars.star(near) {
+            if !mesh.tets[tet as usize].contains(&far) {
+                continue;
+            }
+            let first = *old.first().unwrap_or(&tet);
+            let is_alike = mesh.labels[tet as usize] == mesh.labels[first as usize];
+            if old.len() == MOST_RING || !is_alike || qualities[tet as usize] < worst {
+                return false;
+            }
+            old.push(tet);
         }
+        old.len() >= 3
+    }
+
+    /// Finds the vertices around an edge, if the tets there go all around.
+    fn find_ring(&mut self, u: u32, v: u32) -> bool {
+        let Self { mesh, old, ring, .. } = self;
+        let count = old.len();
         let mut steps = [[NONE; 2]; MOST_RING];
         for (step, &tet) in steps.iter_mut().zip(&*old) {
             *step = others(mesh.tets[tet as usize], u, v);
