@@ -184,6 +184,19 @@ fn vertices_gather_where_colours_change_in_the_number_asked_for() {
 }
 
 #[test]
+fn what_stands_still_is_sampled_more_finely_than_what_moves() {
+    let texture = |x: u32, y: u32| [(hash(hash(x) ^ y) % 200) as u8 + 20; 3];
+    let vertices = |drift: u32, ratio: f64| {
+        let clip = Clip::new([64, 64, 17], |x, y, t| texture(x + drift * t, y), |_, _, _| 0);
+        clip.lattices(&[8, 8], ratio).iter().map(|lattice| lattice.positions.len()).sum::<usize>()
+    };
+    let [still, moving] = [0, 3].map(|drift| vertices(drift, 0.1));
+    assert!(still > 2 * moving && still < 6 * moving, "{still} for {moving}");
+    let [still, moving] = [0, 3].map(|drift| vertices(drift, 0.6));
+    assert!(still < 5 * moving / 4, "there is an end to it: {still} for {moving}");
+}
+
+#[test]
 fn refuses_layers_that_do_not_fit() {
     let clip = Clip::new([8, 8, 12], |_, _, _| [0; 3], |_, _, _| 0);
     let mut adaptive = AdaptiveLattice::new(clip.domain, 0.1);

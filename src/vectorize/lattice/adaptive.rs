@@ -152,7 +152,7 @@ impl AdaptiveLattice {
         importance.saturate();
         let frames = f64::from(times[times.len() - 1] - times[0]) / f64::from(unit);
         let pixels = f64::from(self.domain.width) * f64::from(self.domain.height) * frames;
-        let threshold = importance.threshold((self.vertices_per_pixel * pixels) as usize);
+        let threshold = importance.threshold((self.vertices_per_pixel * pixels) as usize, &pyramid);
         importance.normalize(threshold);
         let labels = LayerLabels::new(&axes, labels);
         if let LayerLabels::Mixed(labels) = &labels {

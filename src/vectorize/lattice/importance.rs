@@ -20,6 +20,15 @@ pub(super) const NEEDED: f32 = f32::INFINITY;
 /// Below this, nothing is to be seen; its inverse is finite.
 const LEAST_THRESHOLD: f32 = 1e-3;
 
+/// What a vertex counts that shows nothing else than those a step before and after it: it collapses at once, at no cost.
+const REPEATED: f64 = 0.25;
+
+/// Most vertices that there are for the sake of those, as a part of the dense lattice's.
+const MOST_PART: f64 = 0.5;
+
+/// Most of the threshold that the change at such a vertex may come to; noise stays above.
+const MOST_CHANGE: f32 = 0.125;
+
 /// Volume of the tets that a vertex splits, in sixths of s^3 where s is its step: by number of odd coordinates.
 const SUPPORT: [f32; 4] = [0.0, 16.0, 16.0, 48.0];
 
@@ -109,22 +118,21 @@ impl Importance {
         plane
     }
 
-    /// The importance that `count` vertices exceed; those that labels need are not counted.
-    pub(super) fn threshold(&self, count: usize) -> f32 {
-        // The bits of a non-negative float ascend with its value: a histogram of its upper bits, 32 to an octave.
-        const SHIFT: u32 = 18;
-        let mut histogram = vec![0usize; (f32::INFINITY.to_bits() >> SHIFT) as usize + 1];
+    /// The importance that `count` vertices exceed; those that labels need are not counted, and of those at which nothing
+    /// changes from step to step each counts [`REPEATED`], as long as they are not more than [`MOST_PART`] of all.
+    pub(super) fn threshold(&self, count: usize, pyramid: &[Grid; LEVELS]) -> f32 {
+        let [columns, lines, planes] = self.size;
         // The first plane is the last layer's.
-        for value in self.planes[1..].iter().flatten() {
-            histogram[(value.to_bits() >> SHIFT) as usize] += 1;
-        }
-        histogram.pop();
-        let mut above = 0;
-        let last = histogram.iter().rposition(|&n| {
-            above += n;
-            above > count
+        let histograms = map((1..planes).collect(), |z| {
+            let mut histogram = Histogram::new();
+            for (n, &value) in self.planes[z].iter().enumerate() {
+                histogram.add(value, change([n % columns, n / columns, z], self.size, pyramid) / MOST_CHANGE);
+            }
+            histogram
         });
-        f32::from_bits((last.unwrap_or(0) as u32 + 1) << SHIFT).max(LEAST_THRESHOLD)
+        let most = count.max(((columns * lines * (planes - 1)) as f64 * MOST_PART) as usize);
+        let whole = histograms.into_iter().reduce(Histogram::joined).unwrap_or_else(Histogram::new);
+        whole.threshold(count, most).max(LEAST_THRESHOLD)
     }
 
     /// Divides all importances by `threshold`.
@@ -182,6 +190,64 @@ fn own_error(vertex: [usize; 3], pyramid: &[Grid; LEVELS]) -> f32 {
     let here = at(vertex);
     let squared: i32 = (0..3).map(|c| (2 * here[c] - a[c] - b[c]).pow(2)).sum();
     squared as f32 * (0.25 / 6.0) * SUPPORT[odd] * (step * step * step) as f32
+}
+
+/// The squared error of a colour that stays as it is a step earlier or later, over the volume of a vertex's tets.
+#[inline]
+fn change(vertex: [usize; 3], size: [usize; 3], pyramid: &[Grid; LEVELS]) -> f32 {
+    let level = (vertex[0] | vertex[1] | vertex[2]).trailing_zeros();
+    if level >= CELL.trailing_zeros() {
+        return f32::INFINITY;
+    }
+    let step = 1usize << level;
+    let at = |z: usize| pyramid[level as usize].at([vertex[0], vertex[1], z].map(|n| n >> level)).map(i32::from);
+    let here = at(vertex[2]);
+    let squared = |there: [i32; 3]| (0..3).map(|c| (here[c] - there[c]).pow(2)).sum::<i32>();
+    let before = vertex[2].checked_sub(step).map_or(0, |z| squared(at(z)));
+    let after = Some(vertex[2] + step).filter(|&z| z < size[2]).map_or(0, |z| squared(at(z)));
+    before.max(after) as f32 * SUPPORT[1] / 6.0 * (step * step * step) as f32
+}
+
+/// Vertices by importance: the bits of a non-negative float ascend with its value, and the upper ones make 32 bins an octave.
+struct Histogram {
+    /// In each bin all vertices of that importance, and those that count in whole from that threshold down.
+    bins: Vec<[usize; 2]>,
+}
+
+impl Histogram {
+    const SHIFT: u32 = 18;
+
+    fn new() -> Self {
+        Self { bins: vec![[0; 2]; Self::bin(f32::INFINITY) + 1] }
+    }
+
+    fn bin(value: f32) -> usize {
+        (value.to_bits() >> Self::SHIFT) as usize
+    }
+
+    /// Adds a vertex that counts in whole below the threshold `changes`.
+    fn add(&mut self, importance: f32, changes: f32) {
+        self.bins[Self::bin(importance)][0] += 1;
+        self.bins[Self::bin(importance.min(changes))][1] += 1;
+    }
+
+    fn joined(mut self, other: Self) -> Self {
+        self.bins.iter_mut().zip(other.bins).for_each(|(own, other)| (0..2).for_each(|n| own[n] += other[n]));
+        self
+    }
+
+    /// The least threshold that leaves no more than `count` by what they count and no more than `most` by number.
+    fn threshold(&self, count: usize, most: usize) -> f32 {
+        let (mut all, mut whole) = (0, 0);
+        // The last bin has what labels need.
+        let last = self.bins[..self.bins.len() - 1].iter().rposition(|bin| {
+            all += bin[0];
+            whole += bin[1];
+            let counted = whole as f64 + (all.saturating_sub(whole)) as f64 * REPEATED;
+            counted > count as f64 || all > most
+        });
+        f32::from_bits((last.unwrap_or(0) as u32 + 1) << Self::SHIFT)
+    }
 }
 
 /// Offsets to the vertices that need a vertex, by which of its coordinates are odd (bits x, y, t).
