@@ -38,7 +38,10 @@ impl Clip {
 
     /// Lattices of layers of these numbers of steps.
     fn lattices(&self, layers: &[u32], vertices_per_pixel: f64) -> Vec<TetLattice> {
-        let mut adaptive = AdaptiveLattice::new(self.domain, vertices_per_pixel);
+        self.lattices_of(layers, AdaptiveLattice::new(self.domain, vertices_per_pixel))
+    }
+
+    fn lattices_of(&self, layers: &[u32], mut adaptive: AdaptiveLattice) -> Vec<TetLattice> {
         let mut lattices = Vec::new();
         let mut first = 0;
         for &steps in layers {
@@ -188,7 +191,8 @@ fn what_stands_still_is_sampled_more_finely_than_what_moves() {
     let texture = |x: u32, y: u32| [(hash(hash(x) ^ y) % 200) as u8 + 20; 3];
     let vertices = |drift: u32, ratio: f64| {
         let clip = Clip::new([64, 64, 17], |x, y, t| texture(x + drift * t, y), |_, _, _| 0);
-        clip.lattices(&[8, 8], ratio).iter().map(|lattice| lattice.positions.len()).sum::<usize>()
+        let adaptive = AdaptiveLattice::new(clip.domain, ratio).with_repeats(0.25);
+        clip.lattices_of(&[8, 8], adaptive).iter().map(|lattice| lattice.positions.len()).sum::<usize>()
     };
     let [still, moving] = [0, 3].map(|drift| vertices(drift, 0.1));
     assert!(still > 2 * moving && still < 6 * moving, "{still} for {moving}");

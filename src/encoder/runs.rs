@@ -28,6 +28,9 @@ struct Held {
     planes_a_frame: i32,
 }
 
+/// What a vertex of the lattice counts at which nothing changes in time.
+const REPEATS: f64 = 0.25;
+
 /// Collects planes and makes runs of them.
 pub(super) struct Runs {
     domain: Domain,
@@ -47,9 +50,11 @@ impl Runs {
     pub(super) fn new(domain: Domain, config: &EncoderConfig) -> Self {
         let is_small = domain.width.min(domain.height) < AdaptiveLattice::MIN_CUT;
         let adaptive = config.lattice == LatticeKind::Adaptive && !(config.superpixels != 1 && is_small);
+        // A short window has no room to collapse them.
+        let repeats = if config.kept_frames() == u32::MAX { REPEATS } else { 1.0 };
         Self {
             domain,
-            adaptive: adaptive.then(|| AdaptiveLattice::new(domain, config.lattice_ratio())),
+            adaptive: adaptive.then(|| AdaptiveLattice::new(domain, config.lattice_ratio()).with_repeats(repeats)),
             steps: config.run_steps(),
             waiting: Vec::new(),
             first: 0,

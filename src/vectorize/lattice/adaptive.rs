@@ -52,6 +52,7 @@ pub struct EdgeCut {
 pub struct AdaptiveLattice {
     domain: Domain,
     vertices_per_pixel: f64,
+    repeats: f64,
     waiting: Option<Layer>,
 }
 
@@ -78,7 +79,13 @@ impl AdaptiveLattice {
     /// Lattices in the slab that `domain` describes, of about `vertices_per_pixel` vertices a pixel and frame beside those
     /// that labels need.
     pub fn new(domain: Domain, vertices_per_pixel: f64) -> Self {
-        Self { domain, vertices_per_pixel, waiting: None }
+        Self { domain, vertices_per_pixel, repeats: 1.0, waiting: None }
+    }
+
+    /// What a vertex counts at which nothing changes from step to step: less than 1 where it collapses at no cost, so that detail
+    /// that stands still has more of them.
+    pub fn with_repeats(self, repeats: f64) -> Self {
+        Self { repeats, ..self }
     }
 
     /// Takes the next layer, whose first plane, frame number `first` of the slab, is the last of the one before; gives the
@@ -152,7 +159,8 @@ impl AdaptiveLattice {
         importance.saturate();
         let frames = f64::from(times[times.len() - 1] - times[0]) / f64::from(unit);
         let pixels = f64::from(self.domain.width) * f64::from(self.domain.height) * frames;
-        let threshold = importance.threshold((self.vertices_per_pixel * pixels) as usize, &pyramid);
+        let count = (self.vertices_per_pixel * pixels) as usize;
+        let threshold = importance.threshold(count, self.repeats, &pyramid);
         importance.normalize(threshold);
         let labels = LayerLabels::new(&axes, labels);
         if let LayerLabels::Mixed(labels) = &labels {

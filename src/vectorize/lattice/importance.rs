@@ -20,10 +20,7 @@ pub(super) const NEEDED: f32 = f32::INFINITY;
 /// Below this, nothing is to be seen; its inverse is finite.
 const LEAST_THRESHOLD: f32 = 1e-3;
 
-/// What a vertex counts that shows nothing else than those a step before and after it: it collapses at once, at no cost.
-const REPEATED: f64 = 0.25;
-
-/// Most vertices that there are for the sake of those, as a part of the dense lattice's.
+/// Most vertices that there are for the sake of those at which nothing changes, as a part of the dense lattice's.
 const MOST_PART: f64 = 0.5;
 
 /// Most of the threshold that the change at such a vertex may come to; noise stays above.
@@ -119,8 +116,8 @@ impl Importance {
     }
 
     /// The importance that `count` vertices exceed; those that labels need are not counted, and of those at which nothing
-    /// changes from step to step each counts [`REPEATED`], as long as they are not more than [`MOST_PART`] of all.
-    pub(super) fn threshold(&self, count: usize, pyramid: &[Grid; LEVELS]) -> f32 {
+    /// changes from step to step each counts `repeats`, as long as they are not more than [`MOST_PART`] of all.
+    pub(super) fn threshold(&self, count: usize, repeats: f64, pyramid: &[Grid; LEVELS]) -> f32 {
         let [columns, lines, planes] = self.size;
         // The first plane is the last layer's.
         let histograms = map((1..planes).collect(), |z| {
@@ -132,7 +129,7 @@ impl Importance {
         });
         let most = count.max(((columns * lines * (planes - 1)) as f64 * MOST_PART) as usize);
         let whole = histograms.into_iter().reduce(Histogram::joined).unwrap_or_else(Histogram::new);
-        whole.threshold(count, most).max(LEAST_THRESHOLD)
+        whole.threshold(count, repeats, most).max(LEAST_THRESHOLD)
     }
 
     /// Divides all importances by `threshold`.
@@ -236,14 +233,14 @@ impl Histogram {
         self
     }
 
-    /// The least threshold that leaves no more than `count` by what they count and no more than `most` by number.
-    fn threshold(&self, count: usize, most: usize) -> f32 {
+    /// The least threshold that leaves no more than `count` by what they count, and no more than `most` by number.
+    fn threshold(&self, count: usize, repeats: f64, most: usize) -> f32 {
         let (mut all, mut whole) = (0, 0);
         // The last bin has what labels need.
         let last = self.bins[..self.bins.len() - 1].iter().rposition(|bin| {
             all += bin[0];
             whole += bin[1];
-            let counted = whole as f64 + (all.saturating_sub(whole)) as f64 * REPEATED;
+            let counted = whole as f64 + (all.saturating_sub(whole)) as f64 * repeats;
             counted > count as f64 || all > most
         });
         f32::from_bits((last.unwrap_or(0) as u32 + 1) << Self::SHIFT)
