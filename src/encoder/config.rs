@@ -258,6 +258,11 @@ impl EncoderConfig {
         (self.most_vertices() / a_frame - 1.0) as u32
     }
 
+    /// Whether the window holds a slab as a whole.
+    pub(super) fn holds_slab(&self) -> bool {
+        self.kept_frames() == u32::MAX
+    }
+
     /// Pixels of a frame.
     pub(super) fn pixels(&self) -> f64 {
         f64::from(self.width) * f64::from(self.height)

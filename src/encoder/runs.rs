@@ -51,7 +51,7 @@ impl Runs {
         let is_small = domain.width.min(domain.height) < AdaptiveLattice::MIN_CUT;
         let adaptive = config.lattice == LatticeKind::Adaptive && !(config.superpixels != 1 && is_small);
         // A short window has no room to collapse them.
-        let repeats = if config.kept_frames() == u32::MAX { REPEATS } else { 1.0 };
+        let repeats = if config.holds_slab() { REPEATS } else { 1.0 };
         Self {
             domain,
             adaptive: adaptive.then(|| AdaptiveLattice::new(domain, config.lattice_ratio()).with_repeats(repeats)),

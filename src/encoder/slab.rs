@@ -142,7 +142,7 @@ impl<Q: WedgeQuadric> SlabEncoder<Q> {
             duration: EncoderConfig::KEY_INT_MAX.end() + 1,
             subpixel_bits: header.subpixel_bits,
         };
-        let is_whole = config.kept_frames() == u32::MAX;
+        let is_whole = config.holds_slab();
         let has_stages = is_whole && (config.target_error <= 0.0 || config.refits > 0);
         let refits = if has_stages { config.refits } else { 0 };
         Ok(Self {

@@ -179,12 +179,11 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
 
     /// Whether the tets around an edge have all labels of `end`, one of its ends. None of them has another one.
     fn is_along(&self, u: u32, v: u32, end: u32) -> bool {
-        let (near, far) = if self.stars.star(u).len() <= self.stars.star(v).len() { (u, v) } else { (v, u) };
         let count = self.wedges(end).count() as u32;
         let (mut found, mut last) = (0u64, None);
-        for &tet in self.stars.star(near) {
+        for tet in self.around_edge(u, v) {
             let label = self.labels[tet as usize];
-            if last == Some(label) || !self.tets[tet as usize].contains(&far) {
+            if last == Some(label) {
                 continue;
             }
             last = Some(label);

@@ -103,11 +103,7 @@ impl<Q: WedgeQuadric> Swapper<'_, Q> {
     fn gather(&mut self, u: u32, v: u32, worst: f32) -> bool {
         let Self { mesh, old, qualities, .. } = self;
         old.clear();
-        let (near, far) = if mesh.stars.star(u).len() <= mesh.stars.star(v).len() { (u, v) } else { (v, u) };
-        for &tet in mesh.stars.star(near) {
-            if !mesh.tets[tet as usize].contains(&far) {
-                continue;
-            }
+        for tet in mesh.around_edge(u, v) {
             let first = *old.first().unwrap_or(&tet);
             let is_alike = mesh.labels[tet as usize] == mesh.labels[first as usize];
             if old.len() == MOST_RING || !is_alike || qualities[tet as usize] < worst {

@@ -204,6 +204,13 @@ impl<Q: WedgeQuadric> WorkMesh<Q> {
         self.wedges(vertex).find(|wedge| wedge.label == label)
     }
 
+    /// The tets around the edge between two vertices. Stars must be there.
+    #[inline]
+    pub(super) fn around_edge(&self, u: u32, v: u32) -> impl Iterator<Item = u32> + '_ {
+        let (near, far) = if self.stars.star(u).len() <= self.stars.star(v).len() { (u, v) } else { (v, u) };
+        self.stars.star(near).iter().copied().filter(move |&tet| self.tets[tet as usize].contains(&far))
+    }
+
     /// From `from` to `to`, in pixels and frames.
     #[inline]
     pub(super) fn offset(&self, from: IVec3, to: IVec3) -> Vec3 {
